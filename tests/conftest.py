@@ -15,7 +15,7 @@ from hypothesis import settings
 from in_process import without_workers
 from small_runs import of_arm
 
-from compare.engines.mujoco import load
+from compare.engines.mujoco import parse
 from compare.robots.arm import ARM
 from compare.run import examine as experiment
 
@@ -92,7 +92,7 @@ def shared(common):
 @pytest.fixture(scope="session")
 def mujoco():
     """MuJoCo with the arm's file."""
-    return load(ARM.mjcf, ARM.tree)
+    return parse(ARM.mjcf, ARM.tree)
 
 
 @pytest.fixture(scope="session")

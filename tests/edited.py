@@ -33,6 +33,14 @@ CART = """<mujoco model="cart">
 </mujoco>"""
 
 
+def edited(*edits: tuple[str, str], text: str = XML) -> str:
+    """The arm's file, or another text, with each of these replaced, which must be there once."""
+    for old, new in edits:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
 def setup_of(model: str | Mujoco = XML, make=Setup.small, **fields) -> Setup:
     """What an experiment needs of the arm, MuJoCo with this MJCF text or engine."""
     return make(ARM, engines(parse(model, ARM.tree) if isinstance(model, str) else model), **fields)

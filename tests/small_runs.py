@@ -4,7 +4,7 @@ from functools import cache
 
 from in_process import InProcess as InProcess
 
-from compare.engines.mujoco import load
+from compare.engines.mujoco import parse
 from compare.experiments import module
 from compare.robots.arm import ARM
 from compare.run.examine import Setup, engines
@@ -13,7 +13,7 @@ from compare.run.examine import Setup, engines
 @cache
 def of_arm(name):
     """The result of an experiment on the arm, every path with few states and steps."""
-    return module(name).rows(Setup.small(ARM, engines(load(ARM.mjcf, ARM.tree))))
+    return module(name).rows(Setup.small(ARM, engines(parse(ARM.mjcf, ARM.tree))))
 
 
 class Lines(list):

@@ -11,7 +11,7 @@ from small_runs import Lines
 
 import tmt
 from compare.core.text import say
-from compare.engines.mujoco import load
+from compare.engines.mujoco import parse
 from compare.experiments import EXPERIMENTS, skipped
 from compare.report import files, verdict
 from compare.robots.arm import ARM
@@ -40,7 +40,7 @@ def test_all_experiments_pass_and_draw_and_the_report_is_of_the_second_robot(tmp
     robot = crane(tmp_path)
     reasons = {name: say(reason) for name in EXPERIMENTS if (reason := skipped(name, robot))}
     assert [name for name in reasons if name != "engines"] == ["published"]
-    setup = Setup.small(robot, engines(load(robot.mjcf, robot.tree)))
+    setup = Setup.small(robot, engines(parse(robot.mjcf, robot.tree)))
     names = [name for name in EXPERIMENTS if name not in reasons]
     sections, causes, _ = examine(names, setup, tmp_path, Lines(), InProcess())
     words = verdict.verdict(sections, len(EXPERIMENTS), causes)

@@ -11,7 +11,7 @@ from compare.engines.mujoco import parse
 from compare.robots import Robot
 from compare.robots.arm import ARM
 from compare.robots.case import Case, Scene
-from compare.robots.validation import WrongField
+from compare.robots.scene import WrongField
 
 
 def refused(robot=ARM, **fields) -> WrongField:

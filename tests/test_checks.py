@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.engines.mujoco import load
+from compare.engines.mujoco import parse
 from compare.experiments import EXPERIMENTS
 from compare.robots.arm import ARM
 from compare.run.examine import Setup, engines, module
@@ -31,6 +31,6 @@ def test_every_check_that_is_listed_is_made_and_no_other(experiment, small, mujo
 
 
 if __name__ == "__main__":
-    of_arm = Setup.small(ARM, engines(load(ARM.mjcf, ARM.tree)))
+    of_arm = Setup.small(ARM, engines(parse(ARM.mjcf, ARM.tree)))
     found = [named(module(name).rows(of_arm)) for name in NAMES]
     LISTED.write_text("".join(f"{line}\n" for lines in found for line in sorted(lines)), encoding="utf-8")

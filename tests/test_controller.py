@@ -10,7 +10,7 @@ from compare.engines.mujoco import read
 from compare.robots.actuators import Actuator, Drive, controller, reason
 from compare.robots.case import rates_at
 from compare.robots.file import robot_of
-from compare.robots.validation import WrongField
+from compare.robots.scene import WrongField
 
 PLAIN = Actuator("s", "a", (1.0,))
 SERVO = Actuator("servo", "b", (0.0, 2.0), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, -4.0))

@@ -81,15 +81,8 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         assert request(words).experiment == words[0]
 
 
-FILES_OF_ARM = [
-    "robot.urdf",
-    "my_arm.xml",
-    "my_robot.xml",
-    "solution.xml",
-    "models/a.xml",
-    "class/a.xml",
-    "submissions/a.xml",
-]
+FILES_OF_ARM = ["my_arm.xml", "my_robot.xml", "solution.xml", "robot.urdf"]
+FILES_OF_ARM += ["models/a.xml", "class/a.xml", "submissions/a.xml"]
 IN_SECONDS = "equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm"
 
 

@@ -7,6 +7,7 @@ from tempfile import mkdtemp
 from types import SimpleNamespace
 
 import numpy
+import numpy as np
 import own_equations
 import pytest
 from in_process import InProcess, answered
@@ -20,16 +21,7 @@ from compare.experiments.setup import Setup, engines
 from compare.run import examine as experiment
 from compare.run.reference import compared_with
 
-OTHERS = [
-    "parameters",
-    "published",
-    "kinematics",
-    "engines",
-    "speed",
-    "stability",
-    "derivatives",
-    "reduction",
-]
+OTHERS = ["parameters", "published", "kinematics", "engines", "speed", "stability", "derivatives", "reduction"]
 STATIC = ["mass", "gravity", "acceleration"]
 
 
@@ -116,6 +108,18 @@ def test_equations_without_any_use_are_compared_to_the_end(folder):
     for section in run.sections:
         for text in (section.title, section.claim, *(caption for _, caption in section.figures)):
             assert "TMT" not in text and "nan" not in text
+
+
+def test_what_nothing_explains_is_drawn_along_the_coordinate_that_tells_most(folder):
+    """h[hip] has sin(5 knee) too much."""
+    odd = "lambda q, v: bias(q, v) + [np.sin(5 * q[1]) + q[0] / 9, 0]"
+    (folder / "odd.py").write_text(f"from mine import *\n\nodd = changed(bias={odd})\n")
+    run = examined(folder, "odd.py:odd", ["diagnosis"], workers=InProcess())
+    (section,) = run.sections
+    curve = section.result.curve
+    assert (curve.entry, curve.coordinate) == ("h[hip]", "knee") and not run.causes
+    assert np.ptp(curve.yours - curve.right) == pytest.approx(2.0, rel=0.03)
+    assert [name for name, _ in section.figures] == ["diagnosis_nearest", "diagnosis_curve"]
 
 
 @pytest.mark.parametrize("asked, joints, right", [

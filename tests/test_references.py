@@ -4,13 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from edited import XML
 from models import PATHS
 
 import tmt
 from compare.robots.arm import ARM
 from compare.run.reference import JointsDiffer, compared_with
 
-XML, ITSELF = ARM.mjcf.read_text(encoding="utf-8"), str(ARM.mjcf)
+ITSELF = str(ARM.mjcf)
 
 
 def written(tmp_path, text, name="other.xml"):
@@ -40,9 +41,8 @@ RENAMED = XML.replace('"alpha"', '"Alpha"').replace(' name="beta"', "").replace(
 HINGE = '<joint name="{}" type="hinge" axis="{}"/>'
 ORDER = [HINGE.format("alpha", "0 1 0"), HINGE.format("beta", "1 0 0")]
 INERTIAL = "<inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/>"
-EXCHANGED = XML.replace(ORDER[0], "X").replace(ORDER[1], ORDER[0].replace("alpha", "second")).replace(
-    "X", ORDER[1].replace("beta", "first")
-)  # fmt: skip
+EXCHANGED = XML.replace(ORDER[0], "X").replace(ORDER[1], HINGE.format("second", "0 1 0"))
+EXCHANGED = EXCHANGED.replace("X", HINGE.format("first", "1 0 0"))
 
 
 @pytest.mark.parametrize("asked, text, names", [

@@ -64,14 +64,14 @@ def test_targets_are_moved_by_degrees_and_metres(tmp_path):
 @pytest.mark.parametrize("text, word", [
     ("x = 1", "x is"), ("[scene]\nname = 'a'", "array"), ("[[scene]\n", "line 1"),
     ("[[scene]]\nposture = 'bent'", "scene 1: .* name"), ("[[scene]]\nname = 'bent, free'", "of arm"),
-    ("[[scene]]\nname = 'a'\n[[scene]]\nname = 'a'", r"scene 2 \('a'\): .* scene 1"),
-    ("[[scene]]\nname = { a = true }", r"name is \{a = true\}"),
-    *((f"[[scene]]\nname = 'a'\n{line}", rf"scene 1 \('a'\): .*{word}") for line, word in (
-        ("foo = 1", "foo is"), ("posture = 'bnt'", "'bnt'; expected zero, hanging"), ("posture = [1, 2, 3]", "posture is"),
+    ("[[scene]]\nname = 'a'\n[[scene]]\nname = 'a'", r'scene 2 \("a"\): .* scene 1'),
+    ("[[scene]]\nname = { a = true }", r'name is \{"a": true\}'),
+    *((f"[[scene]]\nname = 'a'\n{line}", rf'scene 1 \("a"\): .*{word}') for line, word in (
+        ("foo = 1", "foo is"), ("posture = 'bnt'", '"bnt"; expected zero, hanging'), ("posture = [1, 2, 3]", "posture is"),
         ("posture = 'bent'\nq = [1, 2, 3]", "posture and q"), ("q = [1, 2]", r"q is \[1, 2\]; expected 3 numbers"),
-        ("speed = 'fast'", "speed is 'fast'"), ("gravity = [true]", r"gravity is \[true\]; expected true"),
+        ("speed = 'fast'", 'speed is "fast"'), ("gravity = [true]", r"gravity is \[true\]; expected true"),
         ("damping = -1", "damping is -1"), ("locked = ['alpha', 'beta', 'gamma']", "at most 2"),
-        ("duration = 'x'", "duration is 'x'"), ("duration = 1.0\ndt = 0.3", "dt is 0.3"),
+        ("duration = 'x'", 'duration is "x"'), ("duration = 1.0\ndt = 0.3", "dt is 0.3"),
     )),
 ])  # fmt: skip
 def test_what_is_wrong_is_one_line_with_file_and_entry(tmp_path, text, word):

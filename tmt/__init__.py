@@ -1,9 +1,9 @@
 """Equations of motion of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
 
 Stands alone: needs NumPy, llvmlite and mpmath, and knows nothing of any physics engine. Every function takes
-states of any leading batch shape, one array for each, which broadcast, and a further argument `model`: another
-Tree than the assignment's arm. It raises ValueError for wrong shapes, values that are not finite, unknown
-names, a singular Mbar and results beyond the largest double.
+states of any leading batch shape, one array for each, which broadcast, and a further argument `model`:
+another Tree than the assignment's arm. It raises ValueError for wrong shapes, values that are not finite,
+unknown names, a singular Mbar and results beyond the largest double.
 
 Shapes: q (..., nq), qd and tau (..., nv). Of a hinge or slide one number each, of a ball four (a quaternion
 w, x, y, z of length 1) and three (angular velocity in its own axes, and torque): nq = nv = n, the number of
@@ -32,9 +32,9 @@ tree of hinges, slides and balls (a free joint is three slides and a ball), with
 and the gains of a linear controller.
 
 Methods of `simulate`: "rk4"; "semi_implicit_euler", "implicit", "implicitfast" and "discrete" (MuJoCo's);
-"explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with steps
-of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and "taylor", the
-true motion.
+"explicit_euler"; "dopri8" (Dormand and Prince, order 8: the best for many digits) and "dopri8_adaptive" (with
+steps of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and
+"taylor", the true motion.
 
 NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all
 calls of a model, which suits loops over single states; see answers.py. Both differ in the last bits, and say
@@ -206,7 +206,7 @@ def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h, rad/s2, shape (..., nv).
 
-    P and S: the model's position_gain and speed_gain. Assignment, parts e and f. ValueError where Mbar is singular.
+    P and S: position_gain, speed_gain of the model. Assignment, parts e, f. ValueError if Mbar is singular.
     q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m.
 
     >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
@@ -219,8 +219,8 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives accelerations qdd, N m, shape (..., nv).
 
-    The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it is
-    MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
+    The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it
+    is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
     q (..., nq), qd (..., nv), qdd (..., nv): positions, speeds and accelerations, rad, rad/s and rad/s2.
 
     >>> q, qd, tau = np.array([0.5, 0.3, 1.0]), np.ones(3), np.array([1.0, 2.0, 3.0])
@@ -233,11 +233,11 @@ def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = 
 def derivatives(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> Derivatives:
     """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd, each (..., nv, nv).
 
-    Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by qd;
-    dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by turns about
-    its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint, three slides and a
-    ball, by the position of its origin in the inertial frame, then by turns in its own axes. MuJoCo's
-    mj_integratePos moves so, and mjd_transitionFD differentiates so.
+    Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by
+    qd; dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by
+    turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
+    three slides and a ball, by the position of its origin in the inertial frame, then by turns in its own
+    axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so.
     q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m.
 
     >>> q, rest = np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)
@@ -269,10 +269,11 @@ def step_derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact derivatives A = dx+/dx (..., 2 nv, 2 nv) and B = dx+/dtau (..., 2 nv, nv) of one step, x = (movement, qd).
 
-    The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it from
-    the q that it reaches. Of an adaptive method the step is one of its own, of that size.
-    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m; dt (...): the step,
-    s, above 0; method: a key of METHODS. ValueError also where an implicit method does not find its stages.
+    The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it
+    from the q that it reaches. Of an adaptive method the step is one of its own, of that size.
+    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m; dt (...): the
+    step, s, above 0; method: a key of METHODS. ValueError also where an implicit method does not find its
+    stages.
 
     >>> A, B = tmt.step_derivatives([0.0, 0.0, np.pi / 2], [0.0] * 3, [0.0] * 3, 0.01, "semi_implicit_euler")
     >>> print(A.shape, B.shape, A[2, 5].round(9))  # dq+ = dt dqd+
@@ -290,10 +291,10 @@ def step_derivatives(
 def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = ARM) -> Frame:
     """Pose of a site or body, its Jacobian J (..., 6, nv) and J' qd = dJ/dt qd (..., 6), all in the inertial frame.
 
-    J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac, jacp
-    above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd). The
-    rotation takes components in the frame to inertial ones.
-    name: a site of the model (see Tree), or a body: then the frame is that of its joint, with body axes.
+    J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac,
+    jacp above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd).
+    The rotation takes components in the frame to inertial ones. name: a site of the model (see Tree), or a
+    body: then the frame is that of its joint, with body axes.
     q (..., nq), qd (..., nv): positions and speeds, rad and rad/s; without qd at rest.
 
     >>> tool = dataclasses.replace(
@@ -360,9 +361,9 @@ def equations(
     single : float in C.
     head : lines that begin the comment at its head.
     parameters : numbers that are further arguments of each function
-        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it; "payload" and
-        then a body's name: what that carries besides. They are in the frame that is the site of the body's name,
-        else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
+        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it;
+        "payload" and then a body's name: what that carries besides. They are in the frame that is the site of
+        the body's name, else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
     limit : s
         With symbols: the most work, counted as that of one processor core; ValueError beyond.
 

@@ -1,7 +1,7 @@
 """Who answers the public functions: NumPy calls of up to SMALL states, machine code larger ones and those of a prepared model.
 
-Nothing depends on earlier calls: the same call gives the same bits. Compiled code answers where nothing is wrong with what is
-given; whatever is, the literal form says.
+Nothing depends on earlier calls: the same call gives the same bits. Compiled code answers where nothing is
+wrong with what is given; whatever is, the literal form says.
 """
 
 import math
@@ -50,16 +50,16 @@ def answers_of(model: Tree) -> "Answers":
 def prepare(model: Tree = ARM, *quantities: str) -> None:
     """Have machine code answer all calls of a model from now on: for many calls of one state, in a loop or a controller.
 
-    Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first time on a
-    machine all take about a second for an arm and several for a humanoid; derivatives take longer and have to be named.
-    ValueError if the model is no Tree or there is no such quantity.
+    Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first
+    time on a machine all take about a second for an arm and several for a humanoid; derivatives take longer
+    and have to be named. ValueError if the model is no Tree or there is no such quantity.
 
     Parameters
     ----------
     model : Tree, default ARM
     *quantities : names of functions of `tmt`; without any all but derivatives and what has an argument
-        That stands after a colon: "step_derivatives:rk4", and for `frame` of a body or site NAME "frame_pose:NAME",
-        "frame_jacobian:NAME" and "frame_convective:NAME".
+        That stands after a colon: "step_derivatives:rk4", and for `frame` of a body or site NAME
+        "frame_pose:NAME", "frame_jacobian:NAME" and "frame_convective:NAME".
 
     Examples
     --------

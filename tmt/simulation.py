@@ -34,7 +34,7 @@ class Motion(_Path):
     ----------
     t : (records,), s
     q, qd : (..., records, nq) and (..., records, nv), rad and rad/s, NaN from where a run ended early
-    ended : str, None, or array of them in the shape of the batch: why a run ended early, a line that says when
+    ended : str, None, or array of them in the shape of the batch: when and why a run ended early
     evaluations : int, of the dynamics, of all runs; those of an implicit method with their Jacobian
 
     Examples
@@ -62,9 +62,10 @@ def simulate(
 ) -> Motion:  # fmt: skip
     """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
 
-    A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar is singular,
-    Newton's method does not find the stages of an implicit method, an adaptive method would need steps below 1e-9 dt, or series
-    take too many: `ended` of the result, a Motion, says which. Assignment, part i.
+    A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar
+    is singular, Newton's method does not find the stages of an implicit method, an adaptive method would need
+    steps below 1e-9 dt, or series take too many: `ended` of the result, a Motion, says which. Assignment,
+    part i.
 
     Parameters
     ----------
@@ -73,8 +74,8 @@ def simulate(
     dt : float, s, step, above 0
     steps : int, how many, at least 1
     method : str, a key of METHODS, or "taylor": the true motion, rounded once
-        That is a Taylor series in pairs of doubles, whose evaluations are its steps. An adaptive method takes its own
-        steps between those.
+        That is a Taylor series in pairs of doubles, whose evaluations are its steps. An adaptive method takes
+        its own steps between those.
     model : Tree, default ARM
     tolerance : float, default 1e-9, of "taylor" 1e-33
         Of adaptive methods: the error of each step, in units of 1 + |value|.
@@ -153,8 +154,9 @@ def reasons(
 ) -> Array:  # fmt: skip
     """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
 
-    q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did not, and after how
-    many steps. Where each so-manyth state is kept alone, between(run, record) are all from a record to the next.
+    q, qd: the paths (runs, records, nq and nv); codes (runs, 2): why the compiled loop ended each, 0: it did
+    not, and after how many steps. Where each so-manyth state is kept alone, between(run, record) are all from
+    a record to the next.
     """
     ended = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():

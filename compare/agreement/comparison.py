@@ -21,8 +21,8 @@ from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
 from ..robots.joint_map import joint_map
+from ..robots.scene import is_number
 from ..robots.states import random
-from ..robots.validation import is_number
 
 SYMBOLS = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # of entries of quantities
 DEFAULT_STATES = 100

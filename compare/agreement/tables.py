@@ -18,9 +18,8 @@ def slips_of_tables(comparison: Comparison) -> list[Finding]:
     """What explains each table that differs; [] unless all that differs are tables, and each is explained."""
     failing = {name: compared for name, compared in comparison.compared.items() if compared.fails}
     equations = comparison.equations
-    if len(comparison.q) < LEAST_ROWS or any(
-        equations is not None and equations.has(name) for name in failing
-    ):
+    are_tables = equations is None or not any(map(equations.has, failing))
+    if len(comparison.q) < LEAST_ROWS or not are_tables:
         return []
     findings = [next(slips_of_table(comparison, name, compared), None) for name, compared in failing.items()]
     return [finding for finding in findings if finding is not None] if None not in findings else []
@@ -28,48 +27,41 @@ def slips_of_tables(comparison: Comparison) -> list[Finding]:
 
 def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Iterator[Finding]:
     """What explains the differences of one table."""
-    count = len(compared.yours)
-    yours, right, tolerance = (
-        part.reshape(count, -1) for part in (compared.yours, compared.right, compared.tolerance)
-    )
+    count, names = len(compared.yours), list(comparison.entries(name).values())
+    arrays = compared.yours, compared.right, compared.tolerance
+    yours, right, tolerance = (part.reshape(count, -1) for part in arrays)
     wrong = np.abs(yours - right) > tolerance
     if not np.isfinite(yours).all():
         return
-    rows = np.flatnonzero(wrong.any(axis=1))
+
+    def slip(kind: str, **values: object) -> Finding:
+        return Finding("agreement", kind, {"quantity": name} | values)
+
+    rows = np.flatnonzero(wrong.any(axis=1)).tolist()
     if len(rows) <= FEW * count:
-        names = list(comparison.entries(name).values())
-        at = [(int(row), int(column)) for row in rows for column in np.flatnonzero(wrong[row])]
-        values = [
-            (row, names[column], float(yours[row, column]), float(right[row, column]))
-            for row, column in at[:SHOWN]
-        ]
-        yield Finding(
-            "agreement",
-            "wrong_rows",
-            {"quantity": name, "rows": rows.tolist(), "values": values, "count": count},
-        )
+        at = np.argwhere(wrong)[:SHOWN].tolist()
+        values = [(row, names[k], float(yours[row, k]), float(right[row, k])) for row, k in at]
+        yield slip("wrong_rows", rows=rows, values=values, count=count)
     for shift in (1, -1):
-        moved = np.roll(right, shift, axis=0)
-        inner = np.arange(count)[max(shift, 0) : count + min(shift, 0)]
-        if (np.abs(yours - moved) <= tolerance + np.roll(tolerance, shift, axis=0))[inner].all():
-            yield Finding("agreement", "shifted_rows", {"quantity": name, "shift": shift})
+        moved, allowed = np.roll(right, shift, axis=0), tolerance + np.roll(tolerance, shift, axis=0)
+        inner = slice(max(shift, 0), count + min(shift, 0))
+        if (np.abs(yours - moved) <= allowed)[inner].all():
+            yield slip("shifted_rows", shift=shift)
     if exchanged := columns_exchanged(yours, right, tolerance, wrong):
-        names = list(comparison.entries(name).values())
         pairs = [(names[column], names[other]) for column, other in exchanged.items()]
-        yield Finding("agreement", "exchanged_columns", {"quantity": name, "pairs": pairs})
+        yield slip("exchanged_columns", pairs=pairs)
 
 
 def columns_exchanged(yours: ndarray, right: ndarray, tolerance: ndarray, wrong: ndarray) -> dict[int, int]:
     """The columns that hold the values of others, with these; {} unless every wrong one does."""
-    columns = np.flatnonzero(wrong.any(axis=0)).tolist()
+    columns = np.flatnonzero(wrong.any(axis=0))
     if len(columns) > MOST_COLUMNS:
         return {}
-    held = {}
-    for column in columns:
-        off = np.abs(yours[:, [column]] - right)
-        same = np.flatnonzero((off <= tolerance + tolerance[:, [column]]).all(axis=0)).tolist()
-        same = [other for other in same if other in columns]
-        if not same:
-            return {}
-        held[column] = same[0]
-    return held
+    off = np.abs(yours[:, columns, None] - right[:, None, columns])
+    same = (off <= tolerance[:, columns, None] + tolerance[:, None, columns]).all(axis=0)
+    is_explained = same.any(axis=1).all()
+    return (
+        dict(zip(columns.tolist(), columns[same.argmax(axis=1)].tolist()))
+        if is_explained and len(columns)
+        else {}
+    )

@@ -113,6 +113,14 @@ OPTIONS = {
     "--kp": Option(number("gain", 0.0, HIGHEST_GAIN), "KP"),
     "--kv": Option(number("gain", 0.0, HIGHEST_GAIN), "KV"),
     "--at-speed": Option(None),
+    "--error": Option(
+        number("error", 1e-12, 1.0),
+        "E",
+        example=" --mjcf robot.xml --error 0.001 --write small.xml",
+    ),
+    "--points": Option(metavar="NAMES"),
+    "--controls": Option(metavar="CSV", example=" --mjcf robot.xml --controls recorded.csv"),
+    "--write": Option(metavar="FILE"),
 }
 
 

@@ -19,7 +19,7 @@ WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", 
 def in_turns(runs: Sequence[Call], rounds: int) -> list[list[float]]:
     """Seconds of each call of each function, at most `rounds` calls, after one to warm up short functions.
 
-    A function is called again until `is_timed`: a call in which another process had its turn is not the only one.
+    A function is called again until `is_timed`: one call may have had to wait for another process.
     """
     times: list[list[float]] = [[] for _ in runs]
     for k in range(rounds + 1):
@@ -34,7 +34,7 @@ def in_turns(runs: Sequence[Call], rounds: int) -> list[list[float]]:
 
 
 def is_timed(taken: Sequence[float]) -> bool:
-    """Whether calls took long enough together, and the two fastest took the same time, or the fastest is long."""
+    """Whether calls took long enough together, and the two fastest as long as each other, or very long."""
     if not taken or len(taken) * min(taken) < TIMED_ENOUGH:
         return False
     return min(taken) >= LONG or scatter(taken) <= STEADY

@@ -13,13 +13,12 @@ LEAST_STATES = 4  # different positions: with fewer, wrong numbers explain by lu
 
 
 class Detail(NamedTuple):
-    """A coefficient that differs: in terms, or both numbers where they are furthest apart."""
+    """A coefficient that differs, with both numbers where they are furthest apart."""
 
     name: str
-    terms: tuple[str, str]  # yours and the right one in its place, "" for none
-    yours: float = 0.0
-    right: float = 0.0
-    at: tuple[str, ...] = ()  # "knee = 0.3"
+    yours: float
+    right: float
+    at: tuple[str, ...]  # "knee = 0.3"
 
 
 class Diagnosis(NamedTuple):
@@ -28,7 +27,7 @@ class Diagnosis(NamedTuple):
     differs: bool
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
     closest: Cause | None = None  # where nothing explains everything: the single change that leaves least
-    details: tuple[Detail, ...] = ()  # coefficients that differ, with both numbers or in terms
+    details: tuple[Detail, ...] = ()  # coefficients that differ, with both numbers
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all
     parts: tuple[str, ...] = ()  # that differ: "M", "h", or its "velocity terms" and "gravity"

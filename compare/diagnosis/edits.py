@@ -3,7 +3,8 @@
 Each kind is one function in KINDS, which yields the place, what it explains, and the fields of the tree that differ.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import combinations, permutations
 
 import numpy as np
@@ -22,7 +23,8 @@ ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == or
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
 Edit = tuple[str, str, dict[str, ndarray]]
-Ways = dict[tuple[str, str], Callable[[ndarray], ndarray]]  # of a field, by the place and what it explains
+Way = Callable[[ndarray], ndarray]
+Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains
 
 
 def edits(equations: Equations) -> list[Variant]:
@@ -30,7 +32,7 @@ def edits(equations: Equations) -> list[Variant]:
     stated = equations.stated
     chosen: dict[tuple[tuple[Path, str], ...], tuple[Edit, dict[Path, float]]] = {}
     for edit in (edit for kind in KINDS for edit in kind(equations)):
-        moved = {}
+        moved: dict[Path, float] = {}
         for name, field in edit[2].items():
             moved |= {Path(name, at): x for at, x in np.ndenumerate(field - stated[name]) if x}
         if moved:
@@ -58,20 +60,29 @@ def ways_of_tensors() -> Ways:
     """Axes of a tensor permuted, or those of its moments or products alone; products negated or left out."""
     ways: Ways = {}
     for order in ORDERS:
-        new, axes = np.ix_(order, order), f"axes {in_order(order)}"
-        ways[f"inertia of {{}}, {axes}", ""] = lambda I, new=new: I[new]
-        ways[f"moments of inertia of {{}}, {axes}", ""] = lambda I, new=new: np.where(DIAGONAL, I[new], I)
+        axes = f"axes {in_order(order)}"
+        ways[f"inertia of {{}}, {axes}", ""] = permuted(order)
+        ways[f"moments of inertia of {{}}, {axes}", ""] = permuted(order, products=False)
     for order in EXCHANGES:
-        new, fixed = np.ix_(order, order), next(k for k in range(3) if order[k] == k)
+        fixed = next(k for k in range(3) if order[k] == k)
         products = ["".join(sorted(XYZ[fixed] + XYZ[k])) for k in range(3) if k != fixed]
-        place = f"products of inertia {listed(products)} of {{}}"
-        ways[place, "exchanged"] = lambda I, new=new: np.where(DIAGONAL, I, I[new])
+        ways[f"products of inertia {listed(products)} of {{}}", "exchanged"] = permuted(order, moments=False)
     return ways | {
         ("axial and transverse inertia of {}", "exchanged"): axial_for_transverse,
         ("products of inertia of {}", "negated"): lambda I: np.where(DIAGONAL, I, -I),
         ("products of inertia of {}", "left out"): lambda I: np.where(DIAGONAL, I, 0.0),
         ("inertia of {}", "left out, a point mass"): lambda I: 0.0 * I,
     }
+
+
+def permuted(order: Sequence[int], moments: bool = True, products: bool = True) -> Way:
+    """A tensor with its moments or products those of axes in another order."""
+
+    def change(I: ndarray) -> ndarray:
+        new = I[np.ix_(order, order)]
+        return np.where(DIAGONAL, new if moments else I, new if products else I)
+
+    return change
 
 
 def axial_for_transverse(I: ndarray) -> ndarray:
@@ -89,7 +100,7 @@ def ways_of_vectors(name: str) -> Ways:
     ways: Ways = {(name, "zero"): lambda r: 0.0 * r, (name, "of the other sign"): lambda r: -r}
     for order in EXCHANGES:
         moved = [XYZ[k] for k in range(3) if order[k] != k]
-        ways[name, f"coordinates {listed(moved)} exchanged"] = lambda r, order=order: r[list(order)]
+        ways[name, f"coordinates {listed(moved)} exchanged"] = partial(np.take, indices=order)
     return ways
 
 
@@ -133,7 +144,8 @@ def swapped(equations: Equations) -> Iterator[Edit]:
         return {field: after}
 
     for a, b in combinations(range(len(tree.mass)), 2):
-        both, together = listed([tree.body_names[a], tree.body_names[b]]), {}
+        both = listed([tree.body_names[a], tree.body_names[b]])
+        together: dict[str, ndarray] = {}
         for field, name in {"mass": "masses", "com": "CoMs", "inertia": "inertias"}.items():
             together |= exchanged(field, a, b)
             yield f"{name} of {both}", "exchanged", exchanged(field, a, b)

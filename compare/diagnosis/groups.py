@@ -7,7 +7,7 @@ from numpy import ndarray
 
 from ..core.cause import Cause
 from ..core.words import listed
-from ..robots.inertia import point_inertia
+from ..robots.coordinates import point_inertia
 from .fit import Search
 from .model import Equations, Path
 from .places import INERTIA, SMALL
@@ -22,121 +22,107 @@ OF_BODY = 10  # mass, its product with the CoM, tensor about the origin of the f
 def body_columns(equations: Equations) -> ndarray:
     """What a unit of each of the ten numbers of each body adds to the values, (bodies, 10, states, entries)."""
     changes: dict[Path, ndarray] = {}
-    stated, bodies = equations.stated, len(equations.tree.mass)
-    for b in range(bodies):
-        m, c, I = stated["mass"][b], stated["com"][b], stated["inertia"][b]
-        about_origin = I + point_inertia(c, m)
-        for k in range(1 + OF_BODY):  # first the base: the mass is larger by 1, and the others stay
-            first, tensor = m * c, about_origin.copy()
-            if 1 <= k <= 3:
-                first = first + np.eye(3)[k - 1]
-            elif k >= 4 and k < 10:
-                _, i, j = INERTIA[k - 4]
-                tensor[i, j] += 1.0
-                tensor[j, i] = tensor[i, j]
-            mass = m + (k < OF_BODY)
-            com = first / mass if mass else 0.0 * c
-            new = {"mass": mass - m, "com": com - c, "inertia": tensor - point_inertia(com, mass) - I}
-            for field, change in new.items():
-                for at, x in np.ndenumerate(change):
-                    path = Path(field, (b, *at))
-                    changes.setdefault(path, np.zeros(bodies * (1 + OF_BODY)))[b * (1 + OF_BODY) + k] = x
-    values = equations.values(changes).reshape(bodies, 1 + OF_BODY, *equations.right.shape)
-    columns = values[:, :OF_BODY] - values[:, :1]
-    columns[:, 0] = values[:, 0] - equations.right
+    stated, shape = equations.stated, (len(equations.tree.mass), 1 + OF_BODY)
+    for b, k in np.ndindex(shape):  # the last is the base: the mass is larger by 1, and the others stay
+        m, c, I = float(stated["mass"][b]), stated["com"][b], stated["inertia"][b]
+        first, tensor = m * c, I + point_inertia(c, m)
+        if 1 <= k <= 3:
+            first = first + np.eye(3)[k - 1]
+        elif 4 <= k < OF_BODY:
+            _, i, j = INERTIA[k - 4]
+            tensor[i, j] += 1.0
+            tensor[j, i] = tensor[i, j]
+        mass = m + 1.0
+        com = first / mass
+        new = {"mass": 1.0, "com": com - c, "inertia": tensor - point_inertia(com, mass) - I}
+        for field, change in new.items():
+            for at, x in np.ndenumerate(change):
+                changes.setdefault(Path(field, (b, *at)), np.zeros(shape))[b, k] = x
+    flat = {path: rows.ravel() for path, rows in changes.items()}
+    values = equations.values(flat).reshape(*shape, *equations.right.shape)
+    columns = values[:, :OF_BODY] - values[:, OF_BODY:]
+    columns[:, 0] = values[:, OF_BODY] - equations.right
     return columns
 
 
-def fit(search: Search, columns: ndarray) -> tuple[ndarray, ndarray] | None:
-    """Coefficients of columns (n, states, entries) that explain what is given, and which are determined; None: none do."""
+def fit(search: Search, columns: ndarray) -> tuple[ndarray, ndarray]:
+    """Coefficients of columns (n, states, entries) that explain what is given, and which are determined.
+
+    All zero, and none determined, where they do not explain it.
+    """
     A = (columns * search.weight).reshape(len(columns), -1).T
     sizes = np.linalg.norm(A, axis=0)
     active = sizes > 0.0
+    x, determined = np.zeros(len(columns)), np.zeros(len(columns), bool)
     if not active.any():
-        return None
+        return x, determined
     U, s, Vt = np.linalg.svd(A[:, active] / sizes[active], full_matrices=False)
     rank = s > RANK * s[0]
-    x = np.zeros(len(columns))
-    x[active] = (Vt[rank].T @ ((U[:, rank].T @ search.off.ravel()) / s[rank])) / sizes[active]
-    left = search.off.ravel() - A @ x
-    for _ in range(2):  # refined: the columns have sizes far apart
+    left = search.off.ravel()
+    for _ in range(3):  # refined: the columns have sizes far apart
         x[active] += (Vt[rank].T @ ((U[:, rank].T @ left) / s[rank])) / sizes[active]
         left = search.off.ravel() - A @ x
-    determined = np.zeros(len(columns), bool)
     determined[active] = np.linalg.norm(Vt[rank], axis=0) > 1.0 - 1e-6
-    return (x, determined) if np.abs(left).max() <= 1.0 else None
+    return (x, determined) if np.abs(left).max() <= 1.0 else (0.0 * x, determined & False)
 
 
 def loads(equations: Equations, search: Search) -> Iterator[Cause]:
     """A further body that moves with one of the bodies: its mass, CoM and tensor."""
     for body, columns in zip(equations.tree.body_names, body_columns(equations)):
-        found = fit(search, columns)
-        if found is None or not found[1][:4].all() or found[0][0] <= LEAST_LOAD * max(equations.tree.mass):
+        numbers, determined = fit(search, columns)
+        mass = float(numbers[0])
+        if not determined[:4].all() or mass <= LEAST_LOAD * max(equations.tree.mass):
             continue
-        (mass, *rest), (_, *determined) = found
-        com = np.array(rest[:3]) / mass
-        tensor = np.zeros((3, 3))
-        for (_, i, j), x in zip(INERTIA, rest[3:]):
+        com, tensor = numbers[1:4] / mass, np.zeros((3, 3))
+        for (_, i, j), x in zip(INERTIA, numbers[4:]):
             tensor[i, j] = tensor[j, i] = x
         tensor = tensor - point_inertia(com, mass)
         where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(com) < ZERO, 0.0, com))
-        explains = f"{mass:.5g} kg, CoM ({where}) m"
-        if all(determined[3:]):
-            of_tensor = {name: tensor[i, j] for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass}
-            if np.linalg.eigvalsh(tensor)[0] < -ZERO * mass:
-                continue
-            explains += "".join(f", {name} {x:.4g}" for name, x in of_tensor.items()) + " kg m2" * bool(
-                of_tensor
-            )
-        if not all(map(is_round, (mass, *com))):
-            continue
-        yield Cause(rank=3, kind="load", place=f"a load on {body}", stated="", explains=explains)
+        explains, is_known = f"{mass:.5g} kg, CoM ({where}) m", determined[4:].all()
+        of_tensor = {name: tensor[i, j] for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass}
+        if is_known and of_tensor:
+            explains += "".join(f", {name} {x:.4g}" for name, x in of_tensor.items()) + " kg m2"
+        is_possible = not is_known or np.linalg.eigvalsh(tensor)[0] >= -ZERO * mass
+        if is_possible and all(map(is_round, (mass, *com))):
+            yield Cause(rank=3, kind="load", place=f"a load on {body}", stated="", explains=explains)
 
 
-def several(equations: Equations, search: Search) -> Iterator[Cause]:
+def several(search: Search) -> Iterator[Cause]:
     """The same number of all joints or bodies: armatures, masses, moments of inertia."""
-    groups = ["armature of ", "mass of ", *(f"inertia of {body}" for body in equations.tree.body_names)]
-    first = search.coefficients[0]
-    for prefix in groups:
-        chosen = [
-            k for k, place in enumerate(search.places) if of_group(place.name, prefix) and first[k].any()
-        ]
-        if len(chosen) < 2:
-            continue
-        found = fit(search, first[chosen])
-        if found is None:
+    groups: dict[tuple[str, int], list[int]] = {}
+    columns = search.coefficients[0]
+    for k, place in enumerate(search.places):
+        owners = {(path.field, path.at[0]) for path, _ in place.moves}
+        if len(owners) == 1 and place.kind == "number" and columns[k].any():
+            ((field, owner),) = owners
+            groups.setdefault((field, owner if field == "inertia" else 0), []).append(k)
+    for (field, _), chosen in groups.items():
+        if field not in ("armature", "mass", "inertia") or len(chosen) < 2:
             continue
         places = [search.places[k] for k in chosen]
-        changes = [x * place.size for x, place in zip(found[0], places)]
-        if all(place.is_possible(change) for place, change in zip(places, changes)):
-            pairs = [(place.stated, place.value(change)) for place, change in zip(places, changes)]
-            differing = [pair for pair in pairs if abs(pair[1] - pair[0]) > SMALL * max(map(abs, pair))]
-            if len(differing) < 2 or not all(is_round(value) for _, value in differing):
-                continue
-            texts = [", ".join(f"{pair[k]:.6g}" for pair in differing) for k in (0, 1)]
-            names = [
-                place.name.removeprefix(prefix) for place, pair in zip(places, pairs) if pair in differing
-            ]
-            if prefix.startswith("inertia"):
-                names = [name.removesuffix(prefix.removeprefix("inertia")) for name in names]
-                called = f"inertia {listed([name.removeprefix('inertia ') for name in names])}{prefix.removeprefix('inertia')}"
-            else:
-                called = prefix + listed(names)
-            yield Cause(
-                rank=3, kind="several", place=called, stated=texts[0], explains=texts[1], unit=places[0].unit
-            )
+        changes = [x * place.size for x, place in zip(fit(search, columns[chosen])[0], places)]
+        pairs = [(place, place.value(change)) for place, change in zip(places, changes)]
+        pairs = [
+            (place, x) for place, x in pairs if abs(x - place.stated) > SMALL * max(abs(x), abs(place.stated))
+        ]
+        if len(pairs) < 2 or not all(x >= place.least and is_round(x) for place, x in pairs):
+            continue
+        stated, explains = (
+            ", ".join(f"{x:.6g}" for x in those)
+            for those in ([place.stated for place, _ in pairs], [x for _, x in pairs])
+        )
+        names = [place.name.removeprefix(field).partition(" of ") for place, _ in pairs]
+        components = [before.strip() for before, *_ in names if before]
+        called = (
+            f"{field} {listed(components)}".strip()
+            + f" of {listed(list(dict.fromkeys(owner for *_, owner in names)))}"
+        )
+        yield Cause(
+            rank=3, kind="several", place=called, stated=stated, explains=explains, unit=pairs[0][0].unit
+        )
 
 
 def is_round(x: float) -> bool:
     """Whether a number has few digits, as people write them, the fewer the less exact it is."""
-    return any(
-        abs(x - float(f"{x:.{digits}g}")) <= exact * abs(x) or abs(x) < exact
-        for digits, exact in DIGITS.items()
-    )
-
-
-def of_group(name: str, prefix: str) -> bool:
-    """Whether the name of a place is that of a single number of a group."""
-    if prefix.startswith("inertia"):
-        return name.startswith("inertia ") and name.endswith(prefix.removeprefix("inertia"))
-    return name.startswith(prefix) and " and " not in name and " in " not in name and "*" not in name
+    rounded = {float(f"{x:.{digits}g}"): exact for digits, exact in DIGITS.items()}
+    return any(abs(x - near) <= exact * abs(x) or abs(x) < exact for near, exact in rounded.items())

@@ -31,8 +31,6 @@ def cost(cause: Cause, equations: Equations) -> float:
 
 def of_one(cause: Cause, equations: Equations) -> float:
     base, value = OF_KINDS.get(cause.kind, 0.5), cause.explains
-    if cause.kind == "term" and cause.stated == "right":  # terms of an expression
-        return 0.5
     if cause.kind in ("sign", "angles"):
         kinds = dict(zip(equations.coordinates.names, equations.coordinates.all_kinds))
         words = cause.place.replace(",", " ").split()

@@ -17,7 +17,7 @@ from numpy import ndarray
 import tmt
 from tmt.derivation import method
 from tmt.derivation.mechanism import Mechanism
-from tmt.derivation.vectors import ZERO
+from tmt.derivation.vectors import ZERO, Vector
 
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
@@ -230,7 +230,7 @@ class Equations:
         )
 
 
-def vectors(rows: Sequence[Sequence[method.Vector]], count: int) -> ndarray:
+def vectors(rows: Sequence[Sequence[Vector]], count: int) -> ndarray:
     """Vectors of scalars or (count,), as an array (rows, columns, count, 3)."""
     return np.array([[[np.broadcast_to(x, count) for x in v] for v in row] for row in rows]).swapaxes(2, 3)
 

@@ -14,7 +14,7 @@ from numpy import ndarray
 import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
-from ..robots.inertia import point_inertia
+from ..robots.coordinates import point_inertia
 from .conventions import matrices
 from .model import MOST_SPEEDS, Equations
 from .places import sets_of_bodies, sets_of_joints

@@ -95,7 +95,7 @@ class Explanations:
             return found
         return found._replace(
             closest=nearest[0].cause if nearest else None,
-            details=self.compared.details() if layout.qdd is None else (),
+            details=Compared(self.given).details() if layout.qdd is None else (),
             seconds=None if self.is_finished else self.seconds,
         )
 
@@ -111,7 +111,7 @@ class Explanations:
         """
         unusual: list[Cause] = []
         stages = (
-            self.everything, self.derivations, self.of_parts, self.terms, self.groups, self.beside_conventions, self.pairs,
+            self.everything, self.derivations, self.of_parts, self.other_angles, self.groups, self.beside_conventions, self.pairs,
         )  # fmt: skip
         for stage in stages:
             causes: list[Cause] = []
@@ -141,7 +141,7 @@ class Explanations:
     def groups(self) -> Iterator[Cause]:
         """Loads, and numbers of all bodies or joints."""
         yield from loads(self.equations, self.search)
-        yield from several(self.equations, self.search)
+        yield from several(self.search)
 
     def of_parts(self) -> Iterator[Cause]:
         """Slips in some parts alone: in all that differ, or one cause for each."""
@@ -187,10 +187,9 @@ class Explanations:
             add(self.statements.causes([fit]), search.change(fit))
         return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
 
-    def terms(self) -> Iterator[Cause]:
-        """Terms of coefficients; forces of accelerations have none."""
+    def other_angles(self) -> Iterator[Cause]:
+        """Sines and cosines of a hinge, in an entry or a part."""
         yield from self.search.explained(self.angles)
-        yield from self.compared.causes() if self.equations.layout.qdd is None else ()
 
     def beside_conventions(self) -> Iterator[Cause]:
         """A convention and one more cause, in the model's own joints."""
@@ -230,10 +229,6 @@ class Explanations:
                 yield together([variants[v][0], variants[w][0]], 0.0)
 
     # what is computed once
-
-    @cached_property
-    def compared(self) -> Compared:
-        return Compared(self.given)
 
     @cached_property
     def options(self) -> list[Variant]:

@@ -38,11 +38,11 @@ class Statements(NamedTuple):
         """Joints with the zeros of a fit."""
         changes = zip(fit.places, fit.changes)
         zeros = {place.name: place.value(change) - place.stated for place, change in changes}
-        coordinates, joints = self.coordinates, []
-        for name, kind in zip(coordinates.names, coordinates.all_kinds):
+        joints, kinds = [], self.coordinates.all_kinds
+        for name, kind in zip(self.coordinates.names, kinds):
             zero = within_a_turn(zeros.get(f"zero of {name}", 0.0), kind == "slide")
             joints.append(Joint(name, zero=float(f"{zero:.12g}"), slides=kind == "slide"))
-        return JointMap(coordinates, joints)
+        return JointMap(self.coordinates, joints)
 
     def restated(self, cause: Cause, convention: JointMap | None) -> list[Cause]:
         """A cause with how joints are to be stated in its convention; [] if that cannot be."""
@@ -53,9 +53,8 @@ class Statements(NamedTuple):
         if joints is None:
             return []
         if joints.is_same and not wrong.is_same and not cause.parts:
-            names = ", ".join(map(str, wrong.joints))
-            part = Cause(rank=1, kind="order", place="joints", stated=names, explains="those of the model")
+            stated = ", ".join(map(str, wrong.joints))
+            part = Cause(rank=1, kind="order", place="joints", stated=stated, explains="those of the model")
             cause = replace(cause, parts=(part,))
-        statement = list(map(str, joints.joints))
-        option = f"--joints={','.join(statement)}"
-        return [replace(cause, joints=option if by == "option" else f"joints={statement}")]
+        names = list(map(str, joints.joints))
+        return [replace(cause, joints=f"--joints={','.join(names)}" if by == "option" else f"joints={names}")]

@@ -1,6 +1,6 @@
 """The places that are a factor: of terms and their parts, of entries and coefficients; and all places of a search."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, combinations_with_replacement
 
 import numpy as np
@@ -45,7 +45,7 @@ def entries_of_M(equations: Equations) -> dict[str, list[int]]:
     sets = {entry.named(equations.speeds): [k] for k, entry in enumerate(equations.entries[equations.in_M])}
     for (first, rows), (second, columns) in combinations_with_replacement(speeds_of_joints(tree).items(), 2):
         if max(len(rows), len(columns)) > 1:
-            inside = [k for k, (i, j) in enumerate(places) if is_between(i, j, rows, columns)]
+            inside = [k for k, pair in enumerate(places) if is_between(pair, rows, columns)]
             sets[f"M[{first}][{second}]"] = inside
     return sets
 
@@ -57,8 +57,9 @@ def rows_of_h(equations: Equations) -> dict[str, list[int]]:
     return {f"h[{name}]": row for name, row in rows.items()}
 
 
-def is_between(i: int, j: int, first: list[int], second: list[int]) -> bool:
+def is_between(pair: Sequence[int], first: list[int], second: list[int]) -> bool:
     """Whether an entry couples a speed of one joint with one of another."""
+    i, j = pair
     return (i in first and j in second) or (j in first and i in second)
 
 
@@ -191,9 +192,9 @@ def coefficients(equations: Equations) -> Iterator[Place]:
     of_h = {"": (velocity_terms, rest), "velocity terms of ": (velocity_terms, 0.0 * rest)}
     of_h |= {"gravity of ": (0.0 * rest, rest)}
     for name, rows in rows_of_h(equations).items():
-        for part, values in of_h.items():
+        for before, values in of_h.items():
             column = layout.packed(0.0 * M, *values)
-            yield factor("coefficient", f"{part}{name}", column, in_rows(equations, rows))
+            yield factor("coefficient", f"{before}{name}", column, in_rows(equations, rows))
     if equations.nv > MOST_SPEEDS:
         return
 
@@ -210,7 +211,7 @@ def coefficients(equations: Equations) -> Iterator[Place]:
         yield place(term[0].named(equations.speeds), [term])
     joints = speeds_of_joints(equations.tree)
     for first, second in combinations_with_replacement(joints, 2):
-        those = [term for term in terms if is_between(*term[0].at[1:], joints[first], joints[second])]
+        those = [term for term in terms if is_between(term[0].at[1:], joints[first], joints[second])]
         yield place(f"products of the speeds of {first} and {second} in h", those)
     for i, j in chain.from_iterable(((i, j), (j, i)) for i, j in combinations(range(equations.nv), 2)):
         moved = np.zeros_like(rest)

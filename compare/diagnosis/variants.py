@@ -37,7 +37,7 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     """What an option or a convention of the whole file or program changes."""
     tree, q, qd, (M, moving, rest) = equations.tree, equations.q, equations.qd, equations.parts
     drag = np.array(tree.damping) * qd
-    of_h = [
+    of_h: list[tuple[str, str, str, np.ndarray | float, np.ndarray | float]] = [
         ("gravity", "on", "off", moving, 0.0), ("sign of gravity", "+", "-", moving, -rest),
         ("velocity terms in h", "there", "left out", 0.0, rest), ("bias", "there", "left out", 0.0, 0.0),
         ("sign of the bias", "Mbar qdd + h = tau", "Mbar qdd = tau + h", -moving, -rest),
@@ -48,8 +48,8 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     if tree.has_springs:
         sprung = rest + literal.spring_torque(q, tree)
         of_h.append(("springs k (q - rest)", "not in h", "in h", moving, sprung))
-    for place, stated, explains, *parts in of_h:
-        yield option(place, stated, explains, equations.with_bias(*parts))
+    for place, stated, explains, of_speeds, of_gravity in of_h:
+        yield option(place, stated, explains, equations.with_bias(of_speeds, of_gravity))
     if q.shape == qd.shape:
         together, at_rest = (np.concatenate([q, speeds], axis=1) for speeds in (qd, 0.0 * qd))
         orders = {  # the states, and those at rest

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, EngineRecord
-from .outside.model import Body, File, Link, carried
+from . import Array, Course, EngineRecord
+from .outside.model import Body, File, Link
 from .outside.of_urdf import OfUrdf
 from .outside.order import order_of
 
@@ -56,16 +56,16 @@ class Model(OfUrdf):
             damping[self.order.v[place]] = joint.getDampingCoefficient(0)
         return damping
 
-    def bodies(self, q: Array) -> list[list[Body]]:
+    def links(self, q: Array) -> list[Link]:
         numbers = {joint.getName(): k for k, joint in self.joints.items()}
         links = []
         for node in self.skeleton.getBodyNodes():
-            R, inertia = node.getWorldTransform().rotation(), node.getInertia()
-            parent = node.getParentBodyNode()
-            body = Body(inertia.getMass(), node.getCOM(), R @ inertia.getMoment() @ R.T)
+            place, inertia, parent = node.getWorldTransform(), node.getInertia(), node.getParentBodyNode()
+            body = Body(inertia.getMass(), node.getLocalCOM(), inertia.getMoment())
             joint = numbers.get(node.getParentJoint().getName())
-            links.append(Link(node.getName(), parent and parent.getName(), joint, body))
-        return carried(links, len(self.file.names))
+            names = node.getName(), parent and parent.getName()
+            links.append(Link(*names, joint, place.rotation(), place.translation(), body))
+        return links
 
     def gravity(self) -> Array:
         return np.array(self.world.getGravity())
@@ -80,7 +80,11 @@ class Model(OfUrdf):
         self.skeleton.setPositions(x)
         self.skeleton.setVelocities(speeds)
 
-    def start(self, q: Array, v: Array, dt: float, damping: Array) -> None:
+    def start(self, course: Course) -> None:
+        self.start_at(course.q, course.v, course.dt, self.damping)
+
+    def start_at(self, q: Array, v: Array, dt: float, damping: Array) -> None:
+        """Prepare steps of dt from a state, with this damping of the joints."""
         self.world.setTimeStep(dt)
         self.rotors = self.armature / dt  # coefficients of the dampers that are armature
         for place, joint in self.dampers.items():
@@ -90,13 +94,14 @@ class Model(OfUrdf):
     def set_force(self, force: Array, v: Array) -> None:
         self.skeleton.setForces(self.order.engine(self.q, force + self.rotors * v)[1])
 
-    def own_step(self) -> None:
+    def engine_step(self) -> None:
         self.world.step()
 
     def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         self.set_force(force, v)
-        self.own_step()
-        x, self.q = self.skeleton.getPositions(), self.q.copy()
+        self.engine_step()
+        x = self.skeleton.getPositions()
+        self.q = np.empty_like(self.q)
         self.q[self.order.q] = x
         for at, place in self.order.turned:
             self.q[place] = np.roll(Rotation.from_rotvec(x[at]).as_quat(), 1)
@@ -111,7 +116,7 @@ class Model(OfUrdf):
         return self.order.tree(q, self.skeleton.getCoriolisAndGravityForces())
 
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        self.start(q, v, 1.0, np.zeros_like(v))
+        self.start_at(q, v, 1.0, np.zeros_like(v))
         self.set_force(force, v)
         self.skeleton.computeForwardDynamics()
         return self.order.tree(q, self.skeleton.getAccelerations())

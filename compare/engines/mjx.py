@@ -11,9 +11,8 @@ import numpy as np
 
 from tmt import Tree
 
-from ..robots.actuators import Controller
 from . import Array, Course, EngineRecord
-from .outside.model import File, Unread
+from .outside.model import File
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import STAGES, OfCompiled
 
@@ -38,35 +37,21 @@ class Model(OfCompiled):
     def __init__(self, file: File, precision: str):
         import jax
 
-        super().__init__(file, precision)
         jax.config.update("jax_default_device", jax.devices("cpu")[0])  # of all but batches
-        self.bare = self.made_bare(None)
-        self.models = self.made_models(self.bare)
+        super().__init__(file, precision)
         self.data = self.made_data(self.bare)
 
-    def made_bare(self, controller: Controller | None) -> Bare:
-        from .mujoco.handed_on import Bare
-
-        return Bare(self.file.path, self.file.names, controller=controller)
-
-    def made_models(self, bare: Bare) -> dict[str, Any]:
+    def put_model(self, model: Any) -> Any:
         from mujoco import mjx
 
-        try:
-            return {name: mjx.put_model(bare.with_integrator(name), impl="jax") for name in METHODS}
-        except NotImplementedError as error:
-            raise Unread(f"MJX does not have what it needs: {error}") from None
+        return mjx.put_model(model, impl="jax")
 
     def made_data(self, bare: Bare) -> Any:
         from mujoco import mjx
 
         data = mjx.make_data(bare.model, impl="jax")
-        act = {
-            name: values + 0.0 * getattr(data, name)
-            for name, values in bare.engaged._asdict().items()
-            if name != "torque"
-        }
-        return data.replace(**act)
+        controls = {"ctrl": bare.engaged.ctrl, "act": bare.engaged.act}
+        return data.replace(**{name: values + 0.0 * getattr(data, name) for name, values in controls.items()})
 
     @cached_property
     def model(self) -> Any:

@@ -10,8 +10,8 @@ import numpy as np
 
 from . import Array, EngineRecord
 from .outside.mjcf_text import original_or_copy
-from .outside.model import Body, File, Numbers, OtherJoints, OtherNames, ReadModel
-from .outside.order import near, order_of, wrong_masses
+from .outside.model import Body, File, Link, Numbers, OtherJoints, OtherNames, ReadModel
+from .outside.order import order_of
 
 ENGINE = EngineRecord(
     order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", reads_file=True
@@ -71,45 +71,24 @@ class Model(ReadModel):
         gravity = self.model.gravity.linear
         return {"gravity": gravity, "armature": armature, "damping": damping}
 
-    def twists(self, q: Array) -> dict[int, tuple[Array, Array, Array]]:
-        """By the columns of the Jacobian in the world: velocities of the point there that is in the world's origin."""
-        J = self.pinocchio.computeJointJacobians(self.model, self.data, *self.own(q))
-        columns = np.reshape(J, (6, -1)).T
-        speeds, places = self.order.v.tolist(), self.file.coordinates.places.joints
-        twists = {k: (columns[speeds.index(places[k].qd.start)], places[k].kind) for k in self.starts}
-        balls = {k: self.data.oMi[number].translation for number, k in self.last.items()}
-        none = np.zeros(3)
-        return {
-            k: (none, none, balls[k]) if kind == "ball" else (column[:3], column[3:], none)
-            for k, (column, kind) in twists.items() if not self.file.is_free(k)
-        }  # fmt: skip
-
-    def bodies(self, q: Array) -> list[list[Body]]:
-        bodies: list[list[Body]] = [[] for _ in self.file.names]
+    def links(self, q: Array) -> list[Link]:
+        """Those that Pinocchio's joints move."""
         self.pinocchio.forwardKinematics(self.model, self.data, *self.own(q))
+        links = []
         for number, k in self.last.items():
-            body, place = self.model.inertias[number], self.data.oMi[number]
-            inertia = place.rotation @ body.inertia @ place.rotation.T
-            bodies[k].append(Body(body.mass, place.act(body.lever), inertia))
-        return bodies
+            inertia, place = self.model.inertias[number], self.data.oMi[number]
+            body = Body(inertia.mass, inertia.lever.copy(), inertia.inertia.copy())
+            links.append(Link(number, None, k, place.rotation.copy(), place.translation.copy(), body))
+        return links
 
-    def mend(self, name: str, values: Array) -> bool:
+    def set_body(self, link: Link, body: Body) -> None:
+        self.model.inertias[link.name] = self.pinocchio.Inertia(*body)
+
+    def set_field(self, name: str, values: Array) -> bool:
         if name == "gravity":
             self.model.gravity.linear = values
-        elif name == "armature":
-            self.model.armature = values[self.order.v]
-        elif name == "damping":
-            self.model.damping = values[self.order.v]
         else:
-            wrong, stated = wrong_masses(self.numbers(), self.stated), self.stated
-            self.bodies(stated["reference"])  # places them there
-            for number, k in self.last.items():
-                if k in wrong:
-                    place = self.data.oMi[number]
-                    inertia = place.rotation.T @ stated["inertia"][k] @ place.rotation
-                    com = place.actInv(stated["com"][k])
-                    self.model.inertias[number] = self.pinocchio.Inertia(stated["mass"][k], com, inertia)
-            return bool(near(self.numbers()[name], values).all())
+            setattr(self.model, name, values[self.order.v])
         return True
 
     def mass_matrix(self, q: Array) -> Array:

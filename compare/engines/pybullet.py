@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, EngineRecord
-from .outside.model import Body, File, Link, carried
+from . import Array, Course, EngineRecord
+from .outside.model import Body, File, Link
 from .outside.of_urdf import OfUrdf
 
 ENGINE = EngineRecord(
@@ -43,8 +43,8 @@ class Model(OfUrdf):
         numbers = range(self.bullet.getNumJoints(self.robot))
         self.infos = [self.bullet.getJointInfo(self.robot, link) for link in numbers]
         by_name = {info[1].decode(): info for info in self.infos}
-        self.links = [by_name[name][0] for name in file.names]
-        self.order = np.argsort(self.links)  # the Tree's joints in PyBullet's vectors
+        self.link_numbers = [by_name[name][0] for name in file.names]
+        self.order = np.argsort(self.link_numbers)  # the Tree's joints in PyBullet's vectors
         for link in numbers:
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
@@ -53,17 +53,17 @@ class Model(OfUrdf):
 
     def apply(self, mode: int, forces: Array) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
-        self.bullet.setJointMotorControlArray(self.robot, self.links, mode, forces=forces.tolist())
+        self.bullet.setJointMotorControlArray(self.robot, self.link_numbers, mode, forces=forces.tolist())
 
-    def bodies(self, q: Array) -> list[list[Body]]:
-        joints, links = {link: k for k, link in enumerate(self.links)}, []
-        for link, info in enumerate(self.infos):
-            mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, link)
-            centre, turn, *_ = self.bullet.getLinkState(self.robot, link, computeForwardKinematics=True)
+    def links(self, q: Array) -> list[Link]:
+        joints, links = {link: k for k, link in enumerate(self.link_numbers)}, []
+        for number, info in enumerate(self.infos):
+            mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, number)
+            centre, turn, *_ = self.bullet.getLinkState(self.robot, number, computeForwardKinematics=True)
+            body = Body(mass, np.zeros(3), np.diag(moments))  # axes and origin are those of the inertia
             R = Rotation.from_quat(turn).as_matrix()
-            body = Body(mass, np.array(centre), R @ np.diag(moments) @ R.T)
-            links.append(Link(link, info[16], joints.get(link), body))
-        return carried(links, len(self.links))
+            links.append(Link(number, info[16], joints.get(number), R, np.array(centre), body))
+        return links
 
     def gravity(self) -> Array:
         engine = self.bullet.getPhysicsEngineParameters()
@@ -87,22 +87,26 @@ class Model(OfUrdf):
         h[self.order] = self.bullet.calculateInverseDynamics(self.robot, *state, zero)
         return h
 
-    def start(self, q: Array, v: Array, dt: float, damping: Array) -> None:
+    def start(self, course: Course) -> None:
+        self.start_at(course.q, course.v, course.dt, self.damping)
+
+    def start_at(self, q: Array, v: Array, dt: float, damping: Array) -> None:
+        """Prepare steps of dt from a state, with this damping of the joints."""
         self.bullet.setTimeStep(dt)
-        for link, coefficient, *state in zip(self.links, damping, q, v):
+        for link, coefficient, *state in zip(self.link_numbers, damping, q, v):
             self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
             self.bullet.resetJointState(self.robot, link, *state)
 
-    def own_step(self) -> None:
+    def engine_step(self) -> None:
         self.bullet.stepSimulation()
 
     def step(self, force: Array, v: Array) -> tuple[Array, Array]:
         self.apply(self.bullet.TORQUE_CONTROL, force)
-        self.own_step()
-        states = self.bullet.getJointStates(self.robot, self.links)
+        self.engine_step()
+        states = self.bullet.getJointStates(self.robot, self.link_numbers)
         q, v = np.array([state[:2] for state in states]).T
         return q, v
 
     def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        self.start(q, v, 1.0, np.zeros_like(v))
+        self.start_at(q, v, 1.0, np.zeros_like(v))
         return self.step(force, v)[1] - v

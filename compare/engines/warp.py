@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property, partial
@@ -16,7 +15,7 @@ from tmt.methods import lone_speeds
 
 from ..robots.actuators import Controller
 from . import Array, Course, EngineRecord
-from .outside.model import File, Unread
+from .outside.model import File
 from .outside.of_compiled import METHODS as OF_MJX
 from .outside.of_compiled import STAGES, OfCompiled
 
@@ -36,36 +35,29 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 
 
 class Model(OfCompiled):
+    methods, rotors_in_joints = tuple(METHODS), True
+
     def __init__(self, file: File, precision: str):
         import warp
 
         warp.config.log_level = warp.LOG_ERROR
-        silently(warp.init)
         warp.set_device("cpu")
         import mujoco_warp
 
-        super().__init__(file, precision)
         self.warp, self.engine = warp, mujoco_warp
-        self.bare = self.made_bare(None)
-        self.models = self.made_models(self.bare)
-        self.worlds: dict[
-            tuple[int, int, str], Any
-        ] = {}  # data, by MuJoCo's model, the number of states, the device
+        super().__init__(file, precision)
+        # data, by MuJoCo's model, the number of states, the device
+        self.worlds: dict[tuple[int, int, str], Any] = {}
         self.graphs: dict[tuple[Any, ...], Any] = {}
 
     def made_bare(self, controller: Controller | None) -> Bare:
-        from .mujoco.handed_on import Bare
-
-        bare = Bare(self.file.path, self.file.names, rotors_in_joints=True, controller=controller)
+        bare = super().made_bare(controller)
         if controller is None:
             bare.model.opt.iterations = 0  # of its solver of constraints
         return bare
 
-    def made_models(self, bare: Bare) -> dict[str, Any]:
-        try:
-            return {name: self.engine.put_model(bare.with_integrator(name)) for name in METHODS}
-        except NotImplementedError as error:
-            raise Unread(f"MuJoCo Warp does not have what it needs: {error}") from None
+    def put_model(self, model: Any) -> Any:
+        return self.engine.put_model(model)
 
     def held(self, name: str) -> Array:
         field = getattr(self.models["Euler"], name)
@@ -177,13 +169,3 @@ class Model(OfCompiled):
             qpos, qvel = data.qpos.numpy()[0], data.qvel.numpy()[0]
             path.append(np.hstack([qpos[self.bare.qpos], qvel[self.bare.dofs]]))
         return np.array(path), course.steps * STAGES[course.method]
-
-
-def silently(call: Callable[[], object]) -> None:
-    """Call without what compiled code writes to standard error: here that there is no CUDA."""
-    kept, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 2)
-    try:
-        call()
-    finally:
-        os.dup2(kept, 2)

@@ -17,6 +17,8 @@ from ..core.rows import Row, column
 from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import LeftOver
+from ..diagnosis.model import Equations, packed
+from ..engines import Dynamics
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
@@ -27,6 +29,7 @@ from .setup import Setup
 
 EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",), states_causes=True, compares=False)
 SECONDS = 8.0  # of a search
+POINTS = 61  # of a curve
 SECONDS_OF_CONDITIONS = 3.0
 # of Mbar and h at each state, that the conditions take, about: in all, and for each joint
 CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16
@@ -47,8 +50,20 @@ class CauseRow(Row):
     tied: int
 
 
+class Curve(NamedTuple):
+    """An entry of Mbar or h along the coordinate that changes its difference most, from one of the states."""
+
+    entry: str
+    coordinate: str
+    unit: str
+    moved: np.ndarray  # rad or m, as the others (points,)
+    yours: np.ndarray
+    right: np.ndarray
+
+
 @dataclass
 class DiagnosisResult(Result):
+    curve: Curve | None = None  # of a difference that nothing explains
     # single changes that leave least: what they leave, a share, and whether it is within the tolerance
     nearest: tuple[tuple[str, float, bool], ...] = ()
 
@@ -64,6 +79,7 @@ class Found(NamedTuple):
     ratio: float  # of a difference of Mbar or h to its tolerance, the largest
     of_forces: tuple[Cause, ...]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
+    curve: Curve | None  # of a user's own Mbar and h, where nothing explains their difference
 
     @property
     def causes(self) -> list[Cause]:
@@ -93,7 +109,28 @@ def diagnosed(setup: Setup) -> Found:
     right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
     ratio = float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
     left_over = LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau))
-    return Found(engine, len(q), broken, too_slow, diagnosis, ratio, left_over.causes, left_over.ratio)
+    is_drawn = engine == "own" and not is_slow and diagnosis.differs and not diagnosis.causes
+    curve = telling_curve(dynamics, tree, values, right) if is_drawn else None
+    forces = left_over.causes, left_over.ratio
+    return Found(engine, len(q), broken, too_slow, diagnosis, ratio, *forces, curve)
+
+
+def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Values) -> Curve:
+    """The entry that differs most, and the coordinate along which its difference changes most."""
+    ratios = np.nan_to_num(
+        share_of(np.abs(values.packed - right.packed), values.packed_tolerance), posinf=0.0
+    )
+    state, k = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
+    equations, qd = Equations(tree, values.q, values.qd), np.tile(values.qd[state], (POINTS, 1))
+    coordinates, curves = equations.coordinates, []
+    for name, unit, direction in zip(coordinates.speeds, coordinates.units, np.eye(equations.nv)):
+        moved = np.linspace(-1.0, 1.0, POINTS) * (1.0 if unit == "m" else np.pi)
+        q = coordinates.move(np.tile(values.q[state], (POINTS, 1)), moved[:, None] * direction)
+        yours = packed(dynamics.mass_matrix(q), dynamics.bias(q, qd))[:, k]
+        of_model = Equations(tree, q, qd).right[:, k]
+        entry = equations.entries[k].named(equations.speeds)
+        curves.append(Curve(entry, name, unit, moved, yours, of_model))
+    return max(curves, key=lambda curve: np.nan_to_num(np.ptp(curve.yours - curve.right)))
 
 
 def conditions_of(dynamics: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
@@ -119,7 +156,7 @@ def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
 def rows(setup: Setup) -> DiagnosisResult:
     """A row for each explanation; a check of each condition, of Mbar and h, and of accelerations."""
     found = diagnosed(setup)
-    result = DiagnosisResult("diagnosis", nearest=found.diagnosis.nearest)
+    result = DiagnosisResult("diagnosis", nearest=found.diagnosis.nearest, curve=found.curve)
     for condition in found.conditions:
         check(result, found, condition)
     is_known = found.diagnosis.differs or np.isfinite(found.ratio)
@@ -155,7 +192,9 @@ def headline(result: DiagnosisResult) -> Finding | None:
 
 
 def figures(result: DiagnosisResult, robot: Robot) -> Iterator[Drawing]:
-    if result.nearest:
-        from .figures import draw_nearest  # matplotlib is for the process that draws
+    from .figures import draw_curve, draw_nearest  # matplotlib is for the process that draws
 
+    if result.nearest:
         yield partial(draw_nearest, result.nearest)
+    if result.curve is not None:
+        yield partial(draw_curve, *result.curve)

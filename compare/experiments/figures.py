@@ -165,3 +165,18 @@ def draw_nearest(nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figur
     fig.legend(loc="outside upper center", ncols=2)
     caption = Finding("diagnosis", "nearest", {"names": names[:2], "left": left[:2].tolist()})
     return "diagnosis_nearest", fig, caption
+
+
+def draw_curve(
+    entry: str, coordinate: str, unit: str, moved: np.ndarray, yours: np.ndarray, right: np.ndarray
+) -> tuple[str, Figure, Finding]:
+    """An entry of a user's equations and the right one along a coordinate."""
+    fig = Figure(figsize=(WIDTH, 2.6), layout="constrained")
+    ax = fig.subplots()
+    ax.plot(moved, right, color=GREEN, label="right")
+    ax.plot(moved, yours, color=RED, linestyle="--", label="yours")
+    ax.set(xlabel=f"{coordinate}, from its value at the state, {unit}", ylabel=entry)
+    fig.legend(loc="outside upper center", ncols=2)
+    largest = float(np.nan_to_num(np.abs(yours - right)).max())
+    caption = Finding("diagnosis", "curve", {"entry": entry, "coordinate": coordinate, "largest": largest})
+    return "diagnosis_curve", fig, caption

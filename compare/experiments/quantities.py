@@ -16,7 +16,6 @@ from ..core.check import Result
 from ..core.finding import Finding
 from ..core.text import say
 from ..engines import LABELS
-from ..engines.mujoco.dynamics import convective_accelerations
 from ..engines.tmt import Compiled
 from ..judge.agree import AgreementResult, agree
 from ..judge.entries import Entries, unit
@@ -92,9 +91,6 @@ class Comparison:
         function, part, states = quantity.function, quantity.part, quantity.states(self.sample)
         if function not in self.returned:
             self.returned[function] = [getattr(engine, function)(*states) for engine in self.engines]
-            if function == "convective_terms" and self.robot.coordinates.has_balls:
-                # mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body
-                self.returned[function][1] = convective_accelerations(self.engines[1], *states)
         return [values if part is None else values[part] for values in self.returned[function]]
 
     def acceleration_size(self) -> np.ndarray:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar, cast
 
+import numpy as np
+
 from ..core.finding import Finding
 from ..engines import Dynamics, Engine, compared, made
 from ..engines.mujoco.reading import Reading
@@ -34,10 +36,13 @@ def nothing(*_: Any) -> None:
 
 
 class Request(NamedTuple):
-    """What is asked of stability for a file, beside its own step.
+    """What is asked of stability and of reduction for a file, beside its own step.
 
     step: s, and an integrator of MuJoCo. posture: a name, or numbers separated by commas. control_period, delay: s, of a
     program that commands the actuators; kp, kv: its gains for those that are no servos. at_speed: growth along a motion.
+
+    Of reduction: error, rad or m, that is allowed; points: names of bodies or sites, separated by commas; controls: times and
+    controls by the names of actuators; write: the path of the smaller file.
     """
 
     step: tuple[float, str] | None = None
@@ -47,6 +52,10 @@ class Request(NamedTuple):
     kp: float | None = None
     kv: float | None = None
     at_speed: bool = False
+    error: float | None = None
+    points: str | None = None
+    controls: Mapping[str, np.ndarray] | None = None
+    write: str | None = None
 
 
 NO_REQUEST = Request()

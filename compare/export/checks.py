@@ -12,7 +12,6 @@ from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
 from ..engines.mujoco.calls import MinimalCalls
-from ..engines.mujoco.dynamics import convective_accelerations
 from ..experiments.quantities import QUANTITIES, Quantity
 from ..judge.agree import closest
 from ..judge.entries import Entries, unit
@@ -90,10 +89,7 @@ class Judge:
     def largest(self, quantity: Quantity, values: Array, exact: Pairs) -> tuple[float, ...]:
         """The largest difference from MuJoCo and its share of the tolerance, then from the exact value."""
         arguments = self.states[: len(quantity.arguments)]
-        if quantity.function == "convective_terms" and self.tree.coordinates.balls:
-            theirs = convective_accelerations(self.mujoco, *arguments)
-        else:
-            theirs = getattr(self.mujoco, quantity.function)(*arguments)
+        theirs = getattr(self.mujoco, quantity.function)(*arguments)
         from_mujoco = values - (theirs if quantity.part is None else theirs[quantity.part])
         scale = getattr(self.scales, quantity.scale)
         if quantity.function == "acceleration":
@@ -110,12 +106,9 @@ def checked(
 
     other: the file with other values of the parameters, which the program is given then.
     """
-    kind, states = np.float32 if single else np.float64, random_states(compared.robot, count)
-    states, eps, names = (
-        [x.astype(kind).astype(float) for x in states],
-        float(np.finfo(kind).eps),
-        dict.fromkeys(quantities),
-    )
+    kind, names = np.float32 if single else np.float64, dict.fromkeys(quantities)
+    states = [x.astype(kind).astype(float) for x in random_states(compared.robot, count)]
+    eps = float(np.finfo(kind).eps)
     judge = Judge(compared, states, eps)
     try:
         program = make()
@@ -153,7 +146,7 @@ def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
 def times(
     compared: Compared, program: Program | None, quantities: Sequence[str], count: int
 ) -> list[dict[str, Any]]:
-    """ns of an evaluation by C, also compiled for this processor, by tmt's code state after state, by mj_forward; []: not C."""
+    """ns of an evaluation by C, also compiled for this processor, by tmt's code, by mj_forward; []: not C."""
     if not isinstance(program, CProgram):
         return []
     names, (q, qd, tau, dt) = list(dict.fromkeys(quantities)), random_states(compared.robot, count)
@@ -170,15 +163,9 @@ def times(
     for call in calls.values():
         call()  # its code is compiled, or loaded, on the first call
     ns = {key: 1e9 * seconds / count for key, seconds in timing.fastest(calls, ROUNDS).items()}
-    forward = ns.get("mujoco")
-    flags = [flag for flag in libraries if flag != "c"]
-    return [
-        {
-            "quantity": x,
-            "c": ns[x, "c"],
-            "tmt": ns[x, "tmt"],
-            "mujoco": forward,
-            "faster": {flag: ns[x, flag] for flag in flags},
-        }
-        for x in names
-    ]
+    rows = []
+    for name in names:
+        faster = {flag: ns[name, flag] for flag in libraries if flag != "c"}
+        row = {"quantity": name, "c": ns[name, "c"], "tmt": ns[name, "tmt"]}
+        rows.append(row | {"mujoco": ns.get("mujoco"), "faster": faster})
+    return rows

@@ -89,15 +89,14 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     robot, name = compared.robot, options.name or identifier(Path(options.mjcf or "arm").stem)
     terminal.say_lines(compared.reference.lines if options.mjcf else ())
     quantities = (options.quantity or QUANTITIES.get(options.to, OF_MOST)).replace(" ", "").split(",")
-
-    more: dict[str, Any] = {"parameters": words.split(",") if words else [], "limit": options.limit}
+    named = words.split(",") if words else []
+    more: dict[str, Any] = {"parameters": named, "limit": options.limit}
 
     def written(*head: str) -> dict[str, str]:
+        text = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
+        files = FILES[options.to].items()
         try:
-            text = partial(tmt.equations, robot.tree, name=name, single=options.float, head=head)
-            return {
-                f"{name}{ending}": text(to, quantities, **more) for ending, to in FILES[options.to].items()
-            }
+            return {f"{name}{ending}": text(to, quantities, **more) for ending, to in files}
         except ValueError as error:
             raise Refused(error) from None
 
@@ -109,21 +108,17 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
         for file, text in texts.items():
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")
-        program_of = programs.PROGRAMS[options.to]
-        chosen = Parameters(robot.tree, more["parameters"])
+        chosen = Parameters(robot.tree, named)
         stated = {x: np.array(value) for x, value in chosen.values.items()}
         values = parameters.other_values(chosen)
         other = parameters.with_values(compared, chosen, values) if values else None
         arguments = Path(folder), name, robot.tree, quantities, options.float, stated, chosen
-        make = partial(program_of, *arguments)
+        make = partial(programs.PROGRAMS[options.to], *arguments)
         outcome, program = checks.checked(compared, make, quantities, STATES, options.float, other, values)
         times = checks.times(compared, program, quantities, STATES)
-    facts = {
-        "outcome": outcome, "times": times, "name": in_one_line(robot.name), "states": STATES, "features": robot.features,
-        "command": in_one_line(command),
-        "sha256": hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16],
-        "mujoco": installed("mujoco"),
-    }  # fmt: skip
+    facts = {"outcome": outcome, "times": times, "states": STATES, "features": robot.features}
+    facts |= {"name": in_one_line(robot.name), "command": in_one_line(command), "mujoco": installed("mujoco")}
+    facts["sha256"] = hashlib.sha256(Path(robot.mjcf).read_bytes()).hexdigest()[:16]
     texts = written(*block("export", "head", **facts).splitlines())
     paths = [Path(options.out, file) for file in texts]
     try:

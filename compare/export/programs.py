@@ -131,7 +131,7 @@ class CProgram(Program):
         return self.compiled(self.compiler, name, loops, *flags, *texts)
 
     def faster(self) -> dict[str, ctypes.CDLL]:
-        """The functions compiled for a processor that multiplies and adds at once, as this one does, by the option for it."""
+        """The functions compiled for a processor that multiplies and adds at once, by each option for it."""
         cpu = Path("/proc/cpuinfo")
         if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
             return {}
@@ -259,6 +259,10 @@ class MatlabProgram(Program):
 
 
 PROGRAMS: dict[str, type[Program]] = {
-    "c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "casadi": CasadiProgram, "jax": JaxProgram,
+    "c": CProgram,
+    "python": PythonProgram,
+    "matlab": MatlabProgram,
+    "casadi": CasadiProgram,
+    "jax": JaxProgram,
     "latex": SymbolicProgram,
-}  # fmt: skip
+}

@@ -1,1 +1,1 @@
-"""A fleet: many model files, compared one by one by a pool of processes or a cluster, and listed in one table."""
+"""A fleet: many files, compared one by one by processes or a cluster, and listed in one table."""

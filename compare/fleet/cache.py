@@ -1,4 +1,4 @@
-"""The folder of a fleet: a report for each file, with its row of the table and the key of everything that both depend on."""
+"""The folder of a fleet: a report for each file, its row of the table and the key of all they depend on."""
 
 import hashlib
 import json

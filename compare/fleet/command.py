@@ -5,6 +5,7 @@ import os
 import shlex
 import time
 from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +21,7 @@ from ..process.streams import PROGRAM
 from ..report.terminal import Terminal
 
 if TYPE_CHECKING:
+    from .executors import Executor
     from .table import FileRow
 
 SENT = "reference of the fleet"  # folder of the solution in a bundle
@@ -69,7 +71,7 @@ def experiments_of(made: cli.Parser, only: str | None, timing: bool = False) -> 
 
 
 def fleet_status(arguments: Sequence[str]) -> int:
-    """Run the command; the exit status. SystemExit for help and wrong arguments. Refused: it cannot be carried out."""
+    """Run the command; the exit status. SystemExit: help, wrong arguments. Refused: it cannot be done."""
     made = fleet_parser()
     options, unknown = made.parse_known_intermixed_args(arguments)
     if unknown:
@@ -89,7 +91,6 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     """Compare all files and write the table; the exit status."""
     started = time.perf_counter()
     from .cache import locked  # imports are slow
-    from .executors import Cluster, Executor, Pool
     from .models import found_models
     from .rubric import read_rubric
     from .run import Run
@@ -102,19 +103,11 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     models, left_out = found_models(options.paths)
     sent = solution_files(options.reference)
     file_options = FleetOptions(names, not options.full, options.reference, next(iter(sent), ""))
-    with locked(out):
-        executor: Executor
-        if options.dask:
-            executor = Cluster(options.dask, options.limit, TIMING if options.timing else None)
-        else:
-            executor = Pool(1 if options.timing else options.workers or cores(), options.limit)
-        try:
-            run = Run(models, file_options, executor, out, sent)
-            terminal.how_far = run.progress
-            with terminal.progress("", PERIOD):
-                run.carry_out(lambda rows: say_rows(terminal, rows))
-        finally:
-            executor.close()
+    with locked(out), closing(executor_of(options)) as executor:
+        run = Run(models, file_options, executor, out, sent)
+        terminal.how_far = run.progress
+        with terminal.progress("", PERIOD):
+            run.carry_out(lambda rows: say_rows(terminal, rows))
         changed, most = None if before is None else changes(before, run.rows), None
         if rubric:
             rubric.award(run.rows, out)
@@ -128,6 +121,14 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     page, seconds = in_one_line(os.path.join(options.out, "index.html")), time.perf_counter() - started
     terminal.say(f"Fleet: {page} ({seconds:.1f} s)")
     return 0 if run.is_good else 1
+
+
+def executor_of(options: argparse.Namespace) -> "Executor":
+    from .executors import Cluster, Pool  # imports are slow
+
+    if options.dask:
+        return Cluster(options.dask, options.limit, TIMING if options.timing else None)
+    return Pool(1 if options.timing else options.workers or cores(), options.limit)
 
 
 def solution_files(reference: str | None) -> dict[str, bytes]:

@@ -1,6 +1,6 @@
 """Who makes the calls of a fleet: processes of this machine, or the workers of a Dask cluster.
 
-Each call has a process of its own: if that crashes, hangs, exits or needs too much memory, this is the outcome of the call.
+Each call has a process of its own: that it crashes, hangs, exits or needs too much memory is its outcome.
 """
 
 import logging
@@ -45,7 +45,7 @@ class Outcome(NamedTuple, Generic[T]):
 
 @cache
 def own_folder() -> str:
-    """A folder for the temporary files of this process and those that it starts; deleted when the command ends."""
+    """A folder for temporary files of this process and its children, deleted when the command ends."""
     tempfile.tempdir = tempfile.mkdtemp(prefix="fleet-")  # of the forkserver's socket too
     interrupt.undo.append(partial(shutil.rmtree, tempfile.tempdir, ignore_errors=True))
     return tempfile.tempdir
@@ -63,7 +63,7 @@ def memory_of_machine() -> int:
 class Pool:
     """Processes of this machine.
 
-    limit: s for a call; memory: bytes, by default its share; folder: for temporary files, deleted if this process is killed.
+    limit: s for a call; memory: bytes, by default its share; folder: for temporary files.
     """
 
     def __init__(self, workers: int, limit: float, memory: float | None = None, folder: str | None = None):

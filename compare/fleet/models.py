@@ -1,4 +1,4 @@
-"""The models of a fleet: all XML, MJCF and URDF files below the given paths, except files that only other files include.
+"""The models of a fleet: the XML, MJCF and URDF files below the given paths that no other file includes.
 
 A file that is no model is one of them too: the table says why it was refused.
 """
@@ -43,7 +43,7 @@ def unpacked(files: dict[str, bytes], folder: Path) -> Path:
 
 
 def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str]]]:
-    """The models of paths (folders, patterns, files, @list.txt), and files that are left out, with the reason.
+    """The models of paths (folders, patterns, files, @list.txt), and the files that are left out, and why.
 
     A file that is named is a model. Refused: a path without files.
     """
@@ -112,7 +112,7 @@ def lines_of(name: str) -> list[str]:
 
 
 def place_of_report(shown: str) -> str:
-    """The folder of a model's report, relative to that of the fleet; unique, and not inside that of another model."""
+    """The folder of a model's report in that of the fleet; unique, and in that of no other model."""
     path = Path(readable(shown))
     parts = [part for part in path.parts if part not in (path.anchor, os.pardir)]
     if os.path.isabs(shown) or os.pardir in Path(shown).parts:

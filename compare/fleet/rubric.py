@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from ..core.errors import Refused
 from ..core.words import in_one_line, listed, some_of
-from ..robots.validation import is_number
+from ..robots.scene import is_number
 from .cache import RESUME
 from .models import place_of_report
 from .table import FileRow
@@ -70,7 +70,7 @@ def checks_of(report: Path) -> list[Mapping[str, Any]]:
 
 
 def read_rubric(path: str, experiments: Sequence[str]) -> Rubric:
-    """The rubric of a file, for the experiments that are run. Refused, in one line, for what is wrong in it."""
+    """The rubric of a file, for the experiments that are run. Refused, in one line: what is wrong in it."""
     shown, entries = in_one_line(path), []
     try:
         content = tomllib.loads(Path(path).read_text(encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""Run a fleet: submit the files whose reports are missing or old, and write the report of each as it comes."""
+"""Run a fleet: submit the files whose reports are missing or old, write the report of each as it comes."""
 
 import hashlib
 import json

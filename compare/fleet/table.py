@@ -93,9 +93,9 @@ def row_of_data(data: object) -> FileRow | None:
 
 
 def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Reference) -> None:
-    """Set verdict and reason of a row, largest share of a tolerance, and step. lost: parts of the report that broke off.
+    """Set the verdict, reason, largest share of a tolerance, and step of a row.
 
-    An unstable step of the file and joints that are matched by other names do not change the verdict; the reason names them.
+    lost: parts of the report that broke off. The reason names an unstable step and joints of other names, too.
     """
     sections = report.sections
     failed, top = failures(sections), worst(sections)
@@ -125,7 +125,7 @@ def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Referenc
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
-    """Whether the file's step is stable in its runs and with its own servos, None if unknown; the smallest limit, s."""
+    """Whether the file's step is stable in its runs, None if unknown; the smallest limit, s."""
     limits = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     own = [row for row in limits if row.integrator == row.file_integrator]
     stable = [row.stable_at_file_dt for row in own if row.stable_at_file_dt is not None]
@@ -156,7 +156,7 @@ def by_file(table: str) -> dict[str, dict[str, str]]:
 
 
 def changes(before: Mapping[str, Mapping[str, str]], rows: Sequence[FileRow]) -> list[str]:
-    """The changes since an earlier fleet, one line for each file: verdict, step, limit; new and removed files."""
+    """The changes since an earlier fleet, a line for each file: verdict, step, limit; new and removed files."""
     now, lines = by_file(table_of(rows)), []
     for file in sorted(before.keys() | now.keys()):
         old, new = before.get(file, {}), now.get(file, {})

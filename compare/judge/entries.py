@@ -186,9 +186,9 @@ class Entries:
         return tmt.Derivatives(by_q, by_qd, by_tau, by_movement, by_speed)
 
     def step(self, dt: float, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
-        """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step by their values.
+        """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step.
 
-        by: the derivatives at the start, of which a method's step makes the first terms of an exponential; scale: theirs.
+        by: the derivatives at the start, of which a step makes the first terms of an exponential; scale: theirs.
         """
         nv = self.qd.shape[1]
         rates, sizes = np.zeros((2, len(self.q), 3 * nv, 3 * nv))

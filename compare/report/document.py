@@ -151,7 +151,7 @@ class Document:
         not_judged = [check for check in checks if not check.judged]
         figures = section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
-        first = [figure for figure in figures if figure in first or figure.is_main]
+        first = [figure for figure in figures if figure in first or figure.is_main or figure.moves]
         lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]

@@ -55,7 +55,7 @@ def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> pd.Dat
 
 
 def shortened(rows: Sequence[Row], most: int) -> tuple[list[Row], str]:
-    """The most urgent rows, at most `most`, in their order, and how many of how many these are ('' if all of them)."""
+    """The most urgent rows, at most `most`, in their order; how many of how many ('' if all of them)."""
     which = f"{most} of {len(rows):,} rows" if len(rows) > most else ""
     numbers = sorted(range(len(rows)), key=lambda number: rows[number].urgency)
     return [rows[number] for number in sorted(numbers[:most])], which

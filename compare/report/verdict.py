@@ -24,8 +24,12 @@ class Figure(NamedTuple):
     caption: str
 
     @property
+    def moves(self) -> bool:
+        return self.file.endswith(".gif")
+
+    @property
     def path(self) -> str:
-        return self.file if self.file.endswith(".gif") else f"{self.file}.png"
+        return self.file if self.moves else f"{self.file}.png"
 
     @property
     def is_overview(self) -> bool:

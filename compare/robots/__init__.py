@@ -1,5 +1,6 @@
 """What is compared. All that is specific to the assignment's arm is in arm.py."""
 
-from .robot import Claims, Feature, Printed, Question, Robot
+from .case import Robot
+from .printed import Claims, Feature, Printed, Question
 
 __all__ = ["Claims", "Feature", "Printed", "Question", "Robot"]

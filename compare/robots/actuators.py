@@ -1,11 +1,11 @@
 """The actuators of a robot.
 
-The law of an actuator is MuJoCo's: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, along the length l of its transmission,
-with u its control, or its activation. MuJoCo documentation, computation, actuation model.
+The law of an actuator is MuJoCo's: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, along the length l of its
+transmission, with u its control, or its activation. MuJoCo documentation, computation, actuation model.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +18,8 @@ Posture = str | tuple[float, ...]  # its name, or numbers
 class Actuator:
     """An actuator at a joint, a tendon or another transmission of MuJoCo.
 
-    moment: dl/dq, (nv,), if it is the same at every posture (a hinge, a slide, a fixed tendon), else None: then MuJoCo computes
-    it. Forces are N or N m, times the gear.
+    moment: dl/dq, (nv,), if it is the same at every posture (a hinge, a slide, a fixed tendon), else None: then MuJoCo
+    computes it. Forces are N or N m, times the gear.
     """
 
     name: str
@@ -34,15 +34,18 @@ class Actuator:
     refused: str = ""  # why its law is not supported; "": it is
 
     @property
-    def acts(self) -> bool:
-        """Whether it exerts a force by a supported law."""
-        return not (self.off or self.refused)
+    def feeds_back(self) -> bool:
+        """Whether its force depends on length or speed."""
+        return any(self.gain[1:]) or any(self.bias[1:])
+
+    def balancing(self, length: float) -> float:
+        """The u for which a servo has force 0 at this length; other actuators: 0."""
+        gain = self.gain[0] + self.gain[1] * length
+        return -(self.bias[0] + self.bias[1] * length) / gain if self.bias[1] and gain else 0.0
 
     def target(self, length: float) -> float:
-        """The u, within its range, for which a servo has force 0 at this length; other actuators: 0."""
-        gain = self.gain[0] + self.gain[1] * length
-        wanted = -(self.bias[0] + self.bias[1] * length) / gain if self.bias[1] and gain else 0.0
-        return self.clamped(wanted)
+        """The same, within its range."""
+        return self.clamped(self.balancing(length))
 
     def clamped(self, u: float) -> float:
         """u within the ranges of the control and of the activation."""
@@ -51,8 +54,9 @@ class Actuator:
                 u = min(max(u, limits[0]), limits[1])
         return float(u)
 
-    def force(self, u: float, length: float) -> float:
-        return (self.gain[0] + self.gain[1] * length) * u + self.bias[0] + self.bias[1] * length
+    def force(self, u: float, length: float, speed: float = 0.0) -> float:
+        gain = self.gain[0] + self.gain[1] * length + self.gain[2] * speed
+        return gain * u + self.bias[0] + self.bias[1] * length + self.bias[2] * speed
 
     def stiffness(self, u: float) -> float:
         """-d force/dl."""
@@ -73,8 +77,7 @@ class Drive:
     @property
     def feeds_back(self) -> bool:
         """Whether an actuator force depends on position or speed; if none does, there is no step limit."""
-        laws = [(*actuator.bias[1:], *actuator.gain[1:]) for actuator in self.actuators if actuator.acts]
-        return any(map(any, laws))
+        return any(each.feeds_back and not (each.off or each.refused) for each in self.actuators)
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
         """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
@@ -113,10 +116,10 @@ def reason(actuator: Actuator, u: float) -> str:
 def controller(
     drive: Drive, posture: Posture, q: np.ndarray, targets: np.ndarray | float = 0.0
 ) -> Controller:
-    """The controller at a posture: its torque is sum of J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd), l = J q.
+    """The controller at a posture: sum of J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd), l = J q.
 
-    The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,) rad or m,
-    of a ball any numbers; targets: (nv,) rad or m, shift of the targets: the target length of a servo by |J| @ targets.
+    The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,)
+    rad or m, of a ball any numbers; targets: (nv,) rad or m: the target length of a servo is moved by |J| @ targets.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
     moments = [np.array(actuator.moment or (0.0,) * n) for actuator in drive.actuators]
@@ -129,17 +132,11 @@ def controller(
         if why := reason(actuator, u):
             left_out[actuator.name] = why
             continue
-        u = controls[actuator.name] = moved_target(actuator, u, float(np.abs(moment) @ moved))
+        by = float(np.abs(moment) @ moved)
+        if by and actuator.stiffness(u):
+            u = actuator.balancing(actuator.force(u, 0.0) / actuator.stiffness(u) + by)
+        controls[actuator.name] = u
         torque += moment * actuator.force(u, 0.0)
         position_gain += np.outer(moment, moment) * actuator.stiffness(u)
         speed_gain += np.outer(moment, moment) * actuator.damping(u)
     return Controller(tuple(controls.values()), left_out, torque, position_gain, speed_gain)
-
-
-def moved_target(actuator: Actuator, u: float, by: float) -> float:
-    """The control that moves the target of a servo by a length; other actuators: u."""
-    stiffness = actuator.stiffness(u)
-    if not (by and stiffness):
-        return u
-    unlimited = replace(actuator, control_range=None, activation_range=None)
-    return unlimited.target(actuator.force(u, 0.0) / stiffness + by)

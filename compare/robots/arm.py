@@ -9,8 +9,8 @@ import numpy as np
 import tmt
 
 from ..core.finding import Finding
-from .case import Scene
-from .robot import Claims, Printed, Question, Robot
+from .case import Robot, Scene
+from .printed import Claims, Printed, Question
 
 POSTURES = {  # deg, (alpha, beta, gamma); the assignment's named postures
     "zero": (0, 0, 0),

@@ -1,115 +1,153 @@
-"""Scenes and cases: a scene states changes, a case is a robot with a scene."""
+"""What is compared: a robot, and cases of it, each with a scene that states changes."""
 
-import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.derivation.coordinates import Joint
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import GAINS
 
-from ..core.words import some_of
-from .actuators import Controller, controller
+from ..core.finding import Finding
+from ..core.words import capital, some_of
+from .actuators import Controller, Drive, controller
 from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates as Coordinates
-from .coordinates import fastest_rates as fastest_rates
 from .coordinates import rates_at as rates_at
-from .validation import WrongField, are_numbers, is_number
+from .printed import Claims, Feature, Printed, Question
+from .scene import SEED as SEED
+from .scene import Scene as Scene
 
-if TYPE_CHECKING:
-    from .robot import Robot
-
-SEED = 10  # of every random number in a report
-MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
-TIMES = 1e-9, 1e6  # s, the shortest and the longest that is accepted
-TORQUES = ("free", "hold", "servos")
+Range = tuple[float, float] | None  # of a joint, rad or m; None: unlimited
+Numbers = tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class Scene:
-    """A motion of any robot under constant torque, or under constant controls of its actuators.
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
 
-    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute values that would
-    hide those of the file. Raises WrongField for values that no robot can have.
+    Tags of scenes: "full only": not in a quick run; "speed": every method is run; "regular": errors are regular from
+    large steps on; "falls": a free body falls and nothing else moves; "own": of a user or a file, only agreement is
+    expected.
     """
 
     name: str
-    posture: str | tuple[float, ...] = ()  # name, or one number per joint, deg (m, quaternion); (): all zero
-    # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
-    torque: str | tuple[float, ...] = "free"
-    speed: tuple[float, ...] = ()  # deg/s (m/s) at the start; (): at rest
-    damping: float | tuple[float, ...] = 0.0  # N m s/rad (N s/m), added: of all joints, or of each speed
-    targets: float | tuple[float, ...] = 0.0  # deg (m), shift of the targets of the servos, all or each speed
-    gravity: bool = True  # that of the model, or none
-    locked: tuple[str, ...] = ()  # names of joints that keep their position
-    duration: float = 5.0  # s
-    dt: float = 5.0 / 64  # s, the largest step; all others divide it
-    judged: float | None = None  # s during which the band of rounding must be narrow; None: always
-    tags: tuple[str, ...] = ()  # see robots.Robot
-
-    def __post_init__(self) -> None:
-        is_name = isinstance(self.name, str) and bool(self.name.strip()) and self.name.isprintable()
-        self.require("name", is_name, "a text in one line, not empty")
-        is_posture = isinstance(self.posture, str) or are_numbers(self.posture)
-        self.set("posture", is_posture, "the name of a posture, or numbers")
-        is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
-        self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
-        self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
-        for name, time in (("duration", self.duration), ("dt", self.dt)):
-            is_time = is_number(time) and TIMES[0] <= time <= TIMES[1]
-            self.set(name, is_time, f"a time from {TIMES[0]:g} to {TIMES[1]:g} s")
-        accepted = "a number of at least 0 N m s/rad, or one for each joint"
-        self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
-        self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
-        self.require("targets", not np.any(self.targets) or self.torque == "servos", 'torque = "servos"')
-        self.require("gravity", isinstance(self.gravity, bool | np.bool_), "true or false")
-        object.__setattr__(self, "gravity", bool(self.gravity))
-        divides = abs(self.steps * self.dt - self.duration) <= 1e-9 * self.duration and self.steps >= 1
-        accepted = f"a step that divides {self.duration:g} s into at most {MAX_STEPS:,} steps"
-        self.require("dt", divides and self.duration / self.dt <= MAX_STEPS, accepted)
-        if self.judged is not None:
-            is_time = is_number(self.judged) and 0.0 <= self.judged <= self.duration
-            self.set("judged", is_time, f"a time in s of at most {self.duration:g}")
-        for name in ("locked", "tags"):
-            value = getattr(self, name)
-            is_names = isinstance(value, tuple | list) and all(isinstance(part, str) for part in value)
-            self.require(name, is_names, "a list of names")
-            object.__setattr__(self, name, tuple(dict.fromkeys(value)))
-
-    def require(self, name: str, is_right: bool, accepted: str) -> None:
-        """Raise WrongField for a field unless it is right."""
-        if not is_right:
-            raise WrongField(self.name, name, getattr(self, name), accepted)
-
-    def set(self, name: str, is_right: bool, accepted: str) -> None:
-        """Require that a field is right, and store its numbers as floats."""
-        self.require(name, is_right, accepted)
-        value = getattr(self, name)
-        if not isinstance(value, str):
-            object.__setattr__(self, name, tuple(map(float, value)) if np.ndim(value) else float(value))
+    mjcf: Path  # the file that MuJoCo runs
+    tree: tmt.Tree  # the stated numbers
+    postures: Mapping[str, Numbers]  # by name, deg (m, quaternion), joints in the order of the Tree
+    scenes: tuple[Scene, ...]
+    positions: Mapping[str, Numbers] = field(default_factory=dict)  # further postures as q (rad, m), by name
+    ranges: tuple[Range, ...] = ()  # of each joint; (): no ranges
+    described: str = ""  # in a sentence: "a human arm"
+    symbols: Mapping[str, str] = field(default_factory=dict)  # of joints, for figures
+    # posture of a centre, a saddle, a marginal equilibrium
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    # q (times, n) rad -> points, m, drawn as a chain; None: origins of the joints
+    landmarks: Callable[[np.ndarray], list[Any]] | None = None
+    sketched: tuple[str, ...] = ()  # postures of the sketch; (): the first two
+    axes: tuple[str, str, str] = ("x", "y", "z")  # labels of the inertial frame
+    printed: tuple[Printed, ...] = ()
+    claims: Claims | None = None
+    questions: tuple[Question, ...] = ()
+    # (answers by item, dynamics by engine) -> Findings about the printed results
+    remarks: Callable[[Mapping[str, Any], Mapping[str, Any]], list[Finding]] | None = None
+    features: tuple[Feature, ...] = ()  # of a file; its numbers are those that MuJoCo compiled
+    drive: Drive = field(default_factory=Drive)  # its actuators
+    stated_in: str = ""  # another file, the solution, with the numbers for this one; "": none
+    features_stated: tuple[Feature, ...] = ()  # of the solution, as `features`
+    own: tuple[str, ...] = ()  # functions of a user's equations, "mass_matrix" ...; (): tmt's are compared
 
     @property
-    def steps(self) -> int:
-        """The number of steps of length dt."""
-        return round(self.duration / self.dt)
+    def joints(self) -> tuple[str, ...]:
+        return self.tree.joint_names
 
+    @property
+    def compared(self) -> tuple[str, str]:
+        """The names of the two engines that are compared."""
+        return ("own" if self.own else "tmt"), "mujoco"
 
-def is_each(value: Any) -> bool:
-    """Whether a value is a number, or a sequence of numbers that is not empty."""
-    return is_number(value) or (are_numbers(value) and np.size(value) > 0)
+    @property
+    def is_read(self) -> bool:
+        """Whether its numbers are from a file that MuJoCo compiled."""
+        return bool(self.features)
+
+    @property
+    def is_stated(self) -> bool:
+        """Whether its numbers are independent of the file that MuJoCo runs: stated here or in a solution."""
+        return not self.is_read or bool(self.stated_in)
+
+    @property
+    def noun(self) -> str:
+        """Its name in sentences; a file may have any name."""
+        return "robot" if self.is_read else self.name
+
+    @property
+    def coordinates(self) -> Coordinates:
+        return Coordinates(self.joints, self.tree.kind)
+
+    def posture(self, posture: str | Numbers = ()) -> np.ndarray:
+        """q (nq,), rad, of a posture: its name, or numbers in deg, m and quaternions; (): all zero."""
+        if isinstance(posture, str) and posture in self.positions:
+            return np.array(self.positions[posture], dtype=float)
+        numbers = self.postures[posture] if isinstance(posture, str) else posture
+        return self.coordinates.from_degrees(numbers, positions=True) if numbers else np.array(self.tree.zero)
+
+    @property
+    def poses(self) -> dict[str, np.ndarray]:
+        """The named postures, rad, (nq,) each; if there are none, all joints at zero."""
+        named = {name: self.posture(name) for name in (*self.postures, *self.positions)}
+        return named or {"all joints at zero": self.posture()}
+
+    def case(self, name: str = "as it is", **changes: Any) -> "Case":
+        """The robot with changes, the fields of a Scene."""
+        return Case(self, Scene(name, **changes))
+
+    @property
+    def cases(self) -> "tuple[Case, ...]":
+        return tuple(Case(self, scene) for scene in self.scenes)
+
+    @property
+    def cases_of_torque(self) -> "tuple[Case, ...]":
+        """The cases without its own actuators."""
+        return tuple(case for case in self.cases if not case.controller)
+
+    def scene_begins(self, name: str) -> str:
+        """A scene's name at the beginning of a sentence; the name of a user's scene stays as it is."""
+        is_own = any(scene.name == name and "own" in scene.tags for scene in self.scenes)
+        return f"Scene {name}" if is_own else capital(name)
+
+    def with_scenes(self, scenes: tuple[Scene, ...]) -> "Robot":
+        return replace(self, scenes=self.scenes + scenes)
+
+    def with_joints(self, names: Sequence[str]) -> "Robot":
+        """The same robot with other names of its joints, in the order of the Tree."""
+        new_name = dict(zip(self.joints, names, strict=True))
+
+        def renamed(joints: Sequence[str]) -> tuple[str, ...]:
+            return tuple(new_name[joint] for joint in joints)
+
+        return replace(
+            self,
+            tree=replace(self.tree, joint_names=tuple(names)),
+            scenes=tuple(replace(scene, locked=renamed(scene.locked)) for scene in self.scenes),
+            symbols={new_name[joint]: symbol for joint, symbol in self.symbols.items()},
+            printed=tuple(item._replace(sizes=renamed(item.sizes)) for item in self.printed),
+        )
+
+    def symbol(self, joint: str) -> str:
+        return self.symbols.get(joint, joint)
 
 
 @dataclass(frozen=True)
 class Case:
     """A robot with a scene. Raises WrongField if this robot cannot have the scene."""
 
-    robot: "Robot"
+    robot: Robot
     scene: Scene
 
     def __post_init__(self) -> None:
@@ -129,12 +167,11 @@ class Case:
             scene.require("locked", not scene.locked, "no locked joint together with servos")
         is_right = set(scene.locked) <= set(names) and len(scene.locked) < len(names)
         scene.require("locked", is_right, f"at most {len(names) - 1} of {some_of(names)}")
-        locked = [coordinates.by_name[name] for name in scene.locked]
-        moving = any(any(scene.speed[joint.qd]) for joint in locked)
+        moving = any(any(scene.speed[coordinates.by_name[name].qd]) for name in scene.locked)
         scene.require("speed", not moving, f"speed 0 for locked joints ({', '.join(scene.locked)})")
 
     def require_posture(self) -> None:
-        """WrongField unless the posture is a name of the robot's, or one number per position and quaternions of length 1."""
+        """WrongField unless the posture is a name, or one number per position and quaternions of length 1."""
         scene, robot, coordinates = self.scene, self.robot, self.robot.coordinates
         count = self.counted("positions", "{0.position_given}")
         if isinstance(scene.posture, str):
@@ -144,12 +181,12 @@ class Case:
             scene.require("posture", scene.posture in postures, accepted)
         elif scene.posture:
             scene.require("posture", len(scene.posture) == coordinates.nq, count)
-            for joint in coordinates.places.balls:
-                is_unit = abs(np.linalg.norm(scene.posture[joint.q]) - 1.0) <= CLOSE_TO_ONE
-                scene.require("posture", bool(is_unit), "a quaternion w, x, y, z of length 1 for each ball")
+            lengths = [np.linalg.norm(scene.posture[joint.q]) for joint in coordinates.places.balls]
+            is_unit = all(abs(length - 1.0) <= CLOSE_TO_ONE for length in lengths)
+            scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
 
     def counted(self, what: str, unit: str) -> str:
-        """How many numbers are accepted for the positions or the speeds of all joints, and in which units of a Kind."""
+        """How many numbers are accepted for the positions or the speeds of all joints, and their units, of a Kind."""
         names: tuple[str, ...] = getattr(self.robot.coordinates, what)
         units = dict.fromkeys(unit.format(KINDS[kind]) for kind in self.robot.coordinates.all_kinds)
         return f"{len(names)} numbers, one per joint ({some_of(names)}), in {', '.join(units)}"
@@ -183,13 +220,8 @@ class Case:
 
     @property
     def coordinates(self) -> Coordinates:
-        return Coordinates(self.joints, tuple(joint.kind for joint in self.unlocked))
-
-    @cached_property
-    def unlocked(self) -> tuple[Joint, ...]:
-        """The joints that are not locked, with their places in q and v of all joints."""
         by_name = self.robot.coordinates.by_name
-        return tuple(by_name[name] for name in self.joints)
+        return Coordinates(self.joints, tuple(by_name[name].kind for name in self.joints))
 
     @cached_property
     def controller(self) -> Controller | None:
@@ -209,14 +241,13 @@ class Case:
         gravity = tree.gravity if scene.gravity else (0.0, 0.0, 0.0)
         gains = {name: getattr(self.controller, name) for name in GAINS} if self.controller else {}
         damping = tuple(np.add(tree.damping, scene.damping).tolist())
-        return dataclasses.replace(tree, damping=damping, gravity=gravity, **gains)
+        return replace(tree, damping=damping, gravity=gravity, **gains)
 
     @property
     def locked(self) -> Mapping[str, float | tuple[float, ...]]:
         """The positions of the locked joints by name, rad or m; of a ball its quaternion."""
-        joints = [name for name in self.robot.joints if name in self.scene.locked]
         by_name, posture = self.robot.coordinates.by_name, self.posture.tolist()
-        positions = {name: posture[by_name[name].q] for name in joints}
+        positions = {name: posture[joint.q] for name, joint in by_name.items() if name in self.scene.locked}
         return {name: tuple(q) if len(q) > 1 else q[0] for name, q in positions.items()}
 
     @cached_property
@@ -266,7 +297,8 @@ class Case:
 
     def indices(self, of: Literal["q", "qd"]) -> np.ndarray:
         """The indices of the unlocked joints in q or v of all joints."""
-        return np.r_[tuple(getattr(joint, of) for joint in self.unlocked)]
+        by_name = self.robot.coordinates.by_name
+        return np.r_[tuple(getattr(by_name[name], of) for name in self.joints)]
 
     def positions_of_all(self, q: np.ndarray) -> np.ndarray:
         """Positions of all joints, (..., nq), from those of the unlocked joints, (..., nq)."""
@@ -276,4 +308,4 @@ class Case:
 
     def changed(self, **changes: Any) -> "Case":
         """The same robot; the scene with other values."""
-        return Case(self.robot, dataclasses.replace(self.scene, **changes))
+        return Case(self.robot, replace(self.scene, **changes))

@@ -1,4 +1,4 @@
-"""The joints of a robot: their kinds and units, positions and speeds."""
+"""The joints of a robot: their kinds and units, positions and speeds; what its Tree says of them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -92,20 +92,18 @@ class Coordinates(NamedTuple):
         return tuple(names)
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
-        """The movement from q0 to q1, (..., nq) -> (..., nv); for a ball the shortest rotation vector in its own axes."""
+        """The movement from q0 to q1, (..., nv); for a ball the shortest rotation vector in its own axes."""
         if not self.has_balls:
             return np.subtract(q1, q0)
-        end, start = (np.moveaxis(q, -1, 0) for q in np.broadcast_arrays(q1, q0))
-        return np.stack(self.places.difference(list(end), list(start)), axis=-1)
+        end, start = (list(np.moveaxis(q, -1, 0)) for q in np.broadcast_arrays(q1, q0))
+        return np.stack(self.places.difference(end, start), axis=-1)
 
     def move(self, q: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """The position after a movement, (..., nq)."""
         if not self.has_balls:
             return np.add(q, dv)
-        batch = np.broadcast_shapes(np.shape(q)[:-1], np.shape(dv)[:-1])
-        q, dv = np.broadcast_to(q, (*batch, self.nq)), np.broadcast_to(dv, (*batch, self.nv))
-        moved = self.places.move(list(np.moveaxis(q, -1, 0)), list(np.moveaxis(dv, -1, 0)))
-        return np.stack(moved, axis=-1)
+        parts = np.broadcast_arrays(*np.moveaxis(q, -1, 0), *np.moveaxis(dv, -1, 0))
+        return np.stack(self.places.move([*parts[: self.nq]], [*parts[self.nq :]]), axis=-1)
 
     def random(
         self, rng: np.random.Generator, count: int, ranges: Sequence[tuple[float, float] | None] = ()
@@ -133,6 +131,11 @@ class Coordinates(NamedTuple):
                 place = joint.q if positions else joint.qd
                 values[place] = np.radians(values[place])
         return values
+
+
+def point_inertia(place: np.ndarray, mass: float = 1.0) -> np.ndarray:
+    """The inertia of a point mass, kg, at a place (3,), m, about the origin, (3, 3) kg m2: m (c'c 1 - c c')."""
+    return mass * (place @ place * np.eye(3) - np.outer(place, place))
 
 
 def free_joints(tree: Tree) -> list[int]:

@@ -12,9 +12,10 @@ from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minut
 from tmt.model.tree import GAINS
 
 from .actuators import Drive, controller
-from .case import Scene
+from .case import Range, Robot
 from .coordinates import Coordinates, fastest_rates, free_joints
-from .robot import Feature, Range, Robot
+from .printed import Feature
+from .scene import Scene
 
 Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic
@@ -66,10 +67,10 @@ def robot_of(file: RobotFile, shown: str) -> Robot:
 
 
 def robot_of_solution(file: RobotFile, shown: str, solution: RobotFile, whose: str) -> Robot:
-    """The robot of a file with the numbers, postures and scenes of a solution, called `whose`, whose joints have its names."""
+    """The robot of a file with the numbers, postures and scenes of a solution, called `whose`, with its joints' names."""
     robot = robot_of(solution, shown)
-    mjcf, features = file.path or robot.mjcf, file.features
-    return replace(robot, mjcf=mjcf, features=features, stated_in=whose, features_stated=solution.features)
+    mjcf, stated = file.path or robot.mjcf, solution.features
+    return replace(robot, mjcf=mjcf, features=file.features, stated_in=whose, features_stated=stated)
 
 
 def names_of_keys(file: RobotFile) -> dict[str, str]:
@@ -103,9 +104,9 @@ def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tupl
 def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive) -> tuple[Scene, ...]:
     """The scenes of a robot: held, let go, let go with damping; a free body is thrown too; with servos see servo_scenes.
 
-    Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial speed. Methods are
-    compared on a thrown free body, because one that is let go may only fall.
-    start, q: the posture, name and (nq,); dt: step of the file, s; drive: its actuators.
+    Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial speed.
+    Methods are compared on a thrown free body, because one that is let go may only fall. start, q: the posture, name
+    and (nq,); dt: step of the file, s; drive: its actuators.
     """
     coordinates, free = Coordinates(tree.joint_names, tree.kind), free_joints(tree)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))

@@ -1,8 +1,9 @@
 """The joints of a user's equations: their order, sense, zero and units compared with those of the model; joints of two files.
 
-A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg", "knee-0.1rad", "slider+0.2m",
-another zero (own position = position of the model + 90 deg); "knee in deg", positions in deg and speeds in deg/s; "knee in deg,
-rad/s", positions only; and combinations: "-knee+90deg in deg". Mbar and h are always per rad and in N m.
+A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg", "knee-0.1rad",
+"slider+0.2m", another zero (own position = position of the model + 90 deg); "knee in deg", positions in deg and speeds
+in deg/s; "knee in deg (rad/s)", positions only; and combinations: "-knee+90deg in deg". Mbar and h are always per rad
+and in N m.
 """
 
 import re
@@ -48,8 +49,8 @@ class Joint(NamedTuple):
 class JointMap:
     """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and a user's equations (`own`).
 
-    q, v: the index in the model of each own position and speed. The others are factors of own positions (sign, of_q), zeros,
-    and factors of own speeds (sense, of_v).
+    q, v: the index in the model of each own position and speed. The others are factors of own positions (sign, of_q),
+    zeros, and factors of own speeds (sense, of_v).
     """
 
     def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]) -> None:
@@ -57,16 +58,14 @@ class JointMap:
         places = [coordinates.by_name[joint.name] for joint in joints]
         self.q = np.r_[tuple(place.q for place in places)]
         self.v = np.r_[tuple(place.qd for place in places)]
+        # a ball has no sign, zero or unit
+        pairs = list(zip(joints, places))
+        stated = [Joint(joint.name) if place.kind == "ball" else joint for joint, place in pairs]
+        numbers = np.array([(joint.sign, joint.zero, *PER_UNIT[joint.unit]) for joint in stated])
         positions = [place.q.stop - place.q.start for place in places]
         speeds = [place.qd.stop - place.qd.start for place in places]
-        # a ball has no sign, zero or unit
-        pairs = zip(joints, places)
-        stated = [Joint(joint.name) if place.kind == "ball" else joint for joint, place in pairs]
-        signs, units = [joint.sign for joint in stated], [PER_UNIT[joint.unit] for joint in stated]
-        self.sign, self.sense = np.repeat(signs, positions), np.repeat(signs, speeds)
-        self.zero = np.repeat([joint.zero for joint in stated], positions)
-        self.of_q = np.repeat([of_position for of_position, _ in units], positions)
-        self.of_v = np.repeat([of_speed for _, of_speed in units], speeds)
+        self.sign, self.zero, self.of_q, _ = np.repeat(numbers, positions, axis=0).T
+        self.sense, _, _, self.of_v = np.repeat(numbers, speeds, axis=0).T
 
     @property
     def is_same(self) -> bool:
@@ -110,8 +109,8 @@ class JointMap:
         return put(np.asarray(own) * self.sense, self.v)
 
     def mass_matrix(self, own: np.ndarray) -> np.ndarray:
-        back = np.argsort(self.v)
-        return (np.asarray(own) * self.sense[:, None] * self.sense)[..., back[:, None], back]
+        columns = put(np.asarray(own) * self.sense[:, None] * self.sense, self.v)
+        return np.swapaxes(put(np.swapaxes(columns, -1, -2), self.v), -1, -2)
 
 
 def within_a_turn(zero: float, slides: bool) -> float:
@@ -133,11 +132,9 @@ def joint_map(coordinates: Coordinates, stated: Sequence[str] | None) -> JointMa
         raise JointsError(f"joints is {stated!r}; expected a list of names such as {FORMS}")
     joints = [read_joint(text.strip(), coordinates) for text in stated]
     names = [joint.name for joint in joints]
-    twice = [name for name in names if names.count(name) > 1]
-    missing = [name for name in coordinates.names if name not in names]
-    if twice:
+    if twice := [name for name in names if names.count(name) > 1]:
         raise JointsError(f"joint {twice[0]!r} is stated twice")
-    if missing:
+    if missing := [name for name in coordinates.names if name not in names]:
         count = len(coordinates.names)
         raise JointsError(f"joints without {listed(missing)}; expected all {count} of the model")
     return JointMap(coordinates, joints)
@@ -150,7 +147,7 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
         return Joint(text)
     units = [unit for unit in PER_UNIT if unit and text.endswith(f" in {unit}")]
     unit = units[0] if units else ""
-    name, sign, zero = text.removesuffix(f" in {unit}").rstrip() if unit else text, 1.0, 0.0
+    name, sign, zero = text.removesuffix(f" in {unit}").rstrip(), 1.0, 0.0
     if name not in kinds and name.startswith("-"):
         name, sign = name[1:], -1.0
     if name not in kinds and (match := STATED.fullmatch(name)):
@@ -159,12 +156,12 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
         if name in kinds and (measure == "m") != (kinds[name] == "slide"):
             raise JointsError(f"joint {text!r}: {name} is a {kinds[name]}, its zero cannot be in {measure}")
     if name not in kinds:
-        before, is_measured, measure = name.rpartition(" in ")
-        if is_measured and before.removeprefix("-") in kinds:
+        before, _, measure = name.rpartition(" in ")
+        if before.removeprefix("-") in kinds:
             known = ", ".join(filter(None, PER_UNIT))
             raise JointsError(f"joint {text!r}: unknown unit {measure!r}; known: {known}")
         raise JointsError(f"unknown joint {text!r}; known: {listed(coordinates.names)}, stated as {FORMS}")
-    if kinds[name] == "ball" and (sign, zero, unit) != (1.0, 0.0, ""):
+    if kinds[name] == "ball":
         raise JointsError(f"joint {text!r}: {name} is a ball, only its name can be stated")
     if kinds[name] == "slide" and unit:
         raise JointsError(f"joint {text!r}: {name} is a slide, its unit is m")

@@ -53,48 +53,44 @@ class Placement:
         vector = Rotation.from_matrix(self.turn).as_rotvec(degrees=True)
         angle = float(np.linalg.norm(vector))
         axis = np.round(vector / (angle or 1.0), 9) + 0.0  # -0 would be shown
-        values = {"shift": self.shift.tolist(), "angle": angle, "axis": axis.tolist(), "along": self.along}
-        values |= {"is_moved": self.is_moved, "is_turned": self.is_turned}
-        values |= {"drawn": self.drawn, "is_with_gravity": self.is_with_gravity}
+        names = ("along", "is_moved", "is_turned", "drawn", "is_with_gravity")
+        values = {name: getattr(self, name) for name in names}
+        values |= {"shift": self.shift.tolist(), "angle": angle, "axis": axis.tolist()}
         return [Finding("remarks", "placed", values)]
 
 
 def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
-    """The stated Tree, moved and turned such that most of its vectors are those of the Tree of a file, which has its joints."""
+    """The stated Tree, moved and turned such that most of its vectors are those of a file's Tree, with the same joints."""
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
     reference = [tree.reference[joint] for joint in joints]
     drawn = tuple(name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b)
-    turn, most = turned(vectors_of(stated, range(len(joints))), vectors_of(tree, joints))
+    vectors = vectors_of(tree, joints)
+    turn, most = turned(vectors_of(stated, range(len(joints))), vectors)
     there = drawn_at(stated, reference) if drawn else stated
-    other_turn, count = turned(vectors_of(there, range(len(joints))), vectors_of(tree, joints))
+    other_turn, count = turned(vectors_of(there, range(len(joints))), vectors)
     if count > most:
         stated, turn = there, other_turn
     else:
         drawn = ()
-    anchors, _, axes = places_of(stated)
-    file_anchors, _, _ = (values[joints] for values in places_of(tree))
-    anchors, axes = anchors @ turn.T, axes @ turn.T
-    free = [directions(kind, axis) for kind, axis in zip(stated.kind, axes)]
-    size = max(1.0, np.abs(anchors).max(), np.abs(file_anchors).max())
-    shift = shifted(anchors, file_anchors, free, SAME * size)
+    before, _, axes = places_of(stated)
+    anchors, wanted = before @ turn.T, places_of(tree)[0][joints]
+    free = [directions(kind, axis) for kind, axis in zip(stated.kind, axes @ turn.T)]
+    tolerance = SAME * max(1.0, np.abs(anchors).max(), np.abs(wanted).max())
+    shift = shifted(anchors, wanted, free, tolerance)
     moved, along = anchors + shift, []
     for i, (name, projection) in enumerate(zip(stated.joint_names, free)):
-        apart = file_anchors[i] - moved[i]
-        is_on_axis = np.abs(apart - projection @ apart).max() <= SAME * size
-        if is_on_axis and np.abs(apart).max() > SAME * size:
+        apart = wanted[i] - moved[i]
+        is_on_axis = np.abs(apart - projection @ apart).max() <= tolerance
+        if is_on_axis and np.abs(apart).max() > tolerance:
             moved[i] += projection @ apart
             along.append(name)
     if along or shift.any() or (turn != np.eye(3)).any():
-        at, before = list(stated.body_joint), places_of(stated)[0]
+        at = list(stated.body_joint)
         centres = (before[at] + np.array(stated.com)) @ turn.T + shift
         turns, gravity = np.array([turn] * len(at)), tuple((turn @ stated.gravity).tolist())
         stated = with_frames(stated, moved, np.array(stated.axis) @ turn.T, centres, turns, gravity=gravity)
     is_with_gravity = bool(same_vectors(np.array([stated.gravity]), np.array([tree.gravity]))[0])
     return Placement(stated, turn, shift, tuple(along), drawn, is_with_gravity)
-
-
-def rows(values: np.ndarray) -> tuple[tuple[float, ...], ...]:
-    return tuple(map(tuple, values.tolist()))
 
 
 def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
@@ -130,8 +126,9 @@ def with_frames(
     origins = [anchors[parent] if parent >= 0 else np.zeros(3) for parent in tree.parent]
     tensors = turns @ np.array(tree.inertia) @ turns.transpose(0, 2, 1)
     tensors = (tensors + tensors.transpose(0, 2, 1)) / 2.0
-    offset, com = rows(anchors - origins), rows(centres - anchors[list(tree.body_joint)])
-    return replace(tree, offset=offset, axis=rows(axes), com=com, inertia=tuple(map(rows, tensors)), **more)
+    numbers: dict[str, Any] = {"axis": axes, "inertia": tensors, "offset": anchors - origins}
+    numbers["com"] = centres - anchors[list(tree.body_joint)]
+    return replace(tree, **numbers, **more)
 
 
 def turned(vectors: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:

@@ -9,8 +9,7 @@ import tmt
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
 
 from ..core.finding import Finding
-from .case import SEED
-from .robot import Robot
+from .case import SEED, Robot
 
 if TYPE_CHECKING:
     from tmt.exact.many import Pairs

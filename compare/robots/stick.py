@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from tmt import literal
 from tmt.derivation import method
 
+from .case import Robot
 from .coordinates import free_joints
-from .robot import Robot
 
 ELEVATION, AZIMUTH = 20.0, -70.0  # deg, of the camera
 _E, _A = np.radians([ELEVATION, AZIMUTH])

@@ -42,7 +42,7 @@ def draw(
 
 
 def results_needed(experiment: str, names: Sequence[str], sections: Sequence[Section]) -> dict[str, Result]:
-    """The results, rows alone, for the picture of the first screen, if this is the last of its experiments."""
+    """The rows of results for the picture of the first screen, if this is the last of its experiments."""
     picture = picture_of(experiment)
     needed = [name for name in names if picture and picture_of(name) == picture]
     if needed[-1:] != [experiment]:

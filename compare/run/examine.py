@@ -49,7 +49,7 @@ def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **mo
 
 
 def not_chosen(chosen: str) -> set[str]:
-    """The engines that read files and are not among names separated by commas. Refused: a name is none of these."""
+    """The engines that read files and are not chosen, by names with commas. Refused: a name is none of these."""
     known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
     for name in names:
         if name not in known:
@@ -264,7 +264,7 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 def say_outcome(
     terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
 ) -> None:
-    """One line for an experiment, then the new causes, and the first failing checks that no known one explains."""
+    """A line for an experiment, then new causes, and the first failing checks that no known one explains."""
     used = [check.over_tolerance or 0.0 for check in section.result.checks]
     not_judged = failures([section]).not_judged
     about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}

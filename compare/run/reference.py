@@ -1,4 +1,4 @@
-"""The reference of a file: the arm's stated numbers, those of a solution, tmt's equations for the model, or a user's own."""
+"""The reference of a file: the arm's numbers, a solution's, tmt's equations for the model, a user's own."""
 
 import argparse
 from collections import Counter
@@ -25,7 +25,8 @@ from ..robots.case import SEED
 from ..robots.file import robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
-from ..stability.answer import posture_of
+from ..robots.scene_file import read_controls
+from ..stability.place import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
@@ -49,9 +50,7 @@ class Reference(NamedTuple):
     source: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Own | None = None  # the engine of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
-    otherwise: tuple[
-        str, ...
-    ] = ()  # what the file models in another way, without another motion, a line each
+    otherwise: tuple[str, ...] = ()  # modelled in another way, with the same motion, a line each
 
     @property
     def name(self) -> str:
@@ -66,13 +65,8 @@ class Reference(NamedTuple):
         """The first lines of the output and of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
         first = f"reference: {self.kind}; {self.file} compared with {other}"
-        lines = (
-            first,
-            self.matched,
-            *self.otherwise,
-            *self.remarks,
-            *(f"MuJoCo warns: {line}" for line in self.warnings),
-        )
+        warnings = [f"MuJoCo warns: {line}" for line in self.warnings]
+        lines = first, self.matched, *self.otherwise, *self.remarks, *warnings
         return tuple(in_one_line(line) for line in lines if line)
 
 
@@ -83,14 +77,12 @@ class Compared(NamedTuple):
     reading: Reading | None  # None: the robot's numbers are stated
 
     def request_of(self, options: argparse.Namespace) -> Request:
-        """What the options ask of stability; ModelError, in one line, for what needs a file or is not of this one."""
+        """What the options ask; ModelError, in one line, for what needs a file or is not of this one."""
         asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
         given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
         if given and self.reading is None:
-            need = "needs" if len(given) == 1 else "need"
-            raise ModelError(
-                f"{' and '.join(given)} {need} a robot's file; the numbers of {self.robot.name} are stated"
-            )
+            need = f"{' and '.join(given)} {'needs' if len(given) == 1 else 'need'} a robot's file"
+            raise ModelError(f"{need}; the numbers of {self.robot.name} are stated")
         dt, integrator = asked.pop("dt"), asked.pop("integrator")
         if self.reading is None or not given:
             return Request()
@@ -108,6 +100,11 @@ class Compared(NamedTuple):
         period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
         if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
             raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
+        if asked["controls"]:
+            names = [actuator.name for actuator in self.reading.drive.actuators]
+            asked["controls"] = read_controls(asked["controls"], names)
+        if asked["write"] and not Path(asked["write"]).absolute().parent.is_dir():
+            raise ModelError(f"cannot write {asked['write']}: there is no such folder")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 
@@ -116,11 +113,12 @@ def compared_with(
     reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None,
     floating: bool = False,
 ) -> Compared:  # fmt: skip
-    """A file (None: the arm's) and a reference (None: the arm, if the file has exactly its hinges, else the compiled model).
+    """A file (None: the arm's) and a reference (None: the arm, if the file has its hinges, else the compiled model).
 
-    joints: of own equations, separated by commas, see joint_map; shown: the name of the file, if not its path; solution: the
-    path of the solution, if not `reference`; floating: the base of a URDF has a free joint. ModelError, in one line, for a
-    file that cannot be compared, JointsDiffer for different joints, OwnFileError for equations that cannot be used.
+    joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
+    solution: the path of the solution, if not `reference`; floating: the base of a URDF has a free joint.
+    ModelError, in one line, for a file that cannot be compared, JointsDiffer for different joints,
+    OwnFileError for equations that cannot be used.
     """
     source, shown = Source(Path(path or ARM.mjcf), floating), in_one_line(shown or path or "mjcf/arm.xml")
     if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
@@ -151,7 +149,7 @@ def compared_with(
 
 
 def with_arm(source: Source, path: Text, shown: str) -> Compared:
-    """A file (None: the arm's) and the arm's stated numbers, placed as in the file, whose welded bodies are one."""
+    """A file (None: the arm's) and the arm's numbers, placed as in the file, whose welded bodies are one."""
     if path is None:
         return Compared(Reference("arm", shown, (), source.warnings), ARM, parse(source, ARM.tree), None)
     said = tuple(map(say, of_source(source)))
@@ -175,7 +173,7 @@ def is_solution(reference: str | None) -> bool:
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:
-    """The file's joints in the order of the stated ones, and those matched under other names. JointsDiffer if any is left."""
+    """The file's joints in the order of the stated ones; those of other names. JointsDiffer if any is left."""
     try:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:
@@ -188,7 +186,7 @@ def bodies_on(reading: Reading, names: Sequence[str]) -> Counter[str]:
 
 
 def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
-    """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once. OwnFileError if that cannot be."""
+    """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once; or OwnFileError."""
     source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
     try:

@@ -7,32 +7,37 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.rows import Row, column
-from ..engines.mujoco.names import INTEGRATORS
+from ..engines.mujoco.forces import rows_at
+from ..engines.mujoco.names import INTEGRATORS, contact_name
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.step import distance
+from ..engines.mujoco.step import Step, distance
 from ..engines.mujoco.variants import has_free_base
-from ..robots.coordinates import Coordinates
-from ..robots.file import names_of_keys
 from .closed_form import radius_apart
 from .cures import Cure, cures
-from .limits import COARSER, LONGEST, Limit, Tried, limit, tried
-from .naming import limiting
-from .place import Place, in_the_air_at, standing_at
-from .rest import SETTLED
-from .runs import growth_in_run, largest_push, observed, own_limit
+from .growth import LASTS, Growth
+from .limits import COARSER, LONGEST, Limit, limit, tried
+from .place import MOVING, Place, Posture, in_the_air_at, standing_at
+from .rest import SETTLED, Rest
+from .runs import (
+    CALM,
+    FINER,
+    OWN_PUSH,
+    growth_in_run,
+    largest_push,
+    observed,
+    own_limit,
+    speed_at_end,
+    stays_still,
+)
 
-MOST_POSTURES = 6  # the first keyframes
-MOVING = 0.01  # rad/s or m/s: what creeps faster does not rest
-STEP_DIGITS = 4
-CURVE_STEPS, CURVE_RUNS = (
-    18,
-    (0.8, 1.05, 1.15, 1.4, 2.0),
-)  # of a curve: its steps, and those of runs over the limit
+SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
+CURVE_STEPS = 18  # of a curve
+CURVE_RUNS = 0.8, 1.05, 1.15, 1.4, 2.0  # of a limit: steps of runs beside its curve
 
 
 def step_column(**more: Any) -> Any:
     """A field with a time step, s."""
-    return column("s", digits=STEP_DIGITS, **more)
+    return column("s", digits=4, **more)
 
 
 @dataclass(kw_only=True)
@@ -41,7 +46,11 @@ class StepLimitRow(Row):
 
     limit: finite, none, below, saddle, or no_rest, see limits.Limit; moving, it creeps too fast for a rest.
     observed_dt, failing_dt: the longest step at which runs
-    hold and the shortest at which they fail. growth: per step, at the file's step; apart: in closed form minus that.
+    hold and the shortest at which they fail. own_dt: beyond it the file's own run, from where it sinks to, fails.
+    smooth_dt: the limit without dry friction. growth: per step, at the file's step; apart: in closed form minus that.
+    growth_rate: just beyond the limit; of a saddle that of its fall. gives_way: from the rest to that at the limit.
+    finer_push: whether a finer step bears no larger push. moved: from the posture to the rest. has_fallen: by a free body.
+    held_objects: loose objects that move on, held where they are. Speeds are in rad/s or m/s, movements in rad or m.
     """
 
     posture: str
@@ -52,37 +61,30 @@ class StepLimitRow(Row):
     predicted_dt: float | None = step_column()
     observed_dt: float | None = step_column(default=None)
     failing_dt: float | None = step_column(default=None)
-    own_dt: float | None = step_column(
-        default=None
-    )  # the file's own run, from where it sinks to, fails beyond
-    smooth_dt: float | None = step_column(default=None)  # the limit without dry friction
+    own_dt: float | None = step_column(default=None)
+    smooth_dt: float | None = step_column(default=None)
     file_dt: float = column("s")
     file_integrator: str
     stable_at_file_dt: bool | None
     limiting_joint: str = ""
     limiting_contact: str = ""
-    growth_rate: float | None = column(
-        "per_s", default=None
-    )  # just beyond the limit; of a saddle that of its fall
+    growth_rate: float | None = column("per_s", default=None)
     growth: float | None = column(digits=8, default=None)
     apart: float | None = None
-    largest_push: float | None = None  # rad/s or m/s
-    finer_push: bool | None = None  # whether a finer step bears no larger push
-    gives_way: float | None = None  # rad or m, from the rest to that at the limit
-    has_fallen: bool = False  # a free body rests far from its posture
-    moved: float | None = None  # rad or m, from the posture to the rest
+    largest_push: float | None = None
+    finer_push: bool | None = None
+    gives_way: float | None = None
+    has_fallen: bool = False
+    moved: float | None = None
     moved_joint: str = ""
-    creep: float | None = None  # rad/s or m/s
+    creep: float | None = None
     creeping_joint: str = ""
+    held_objects: str = ""
 
     @property
     def contradicted(self) -> bool:
         """Whether runs near rest hold or fail elsewhere than at the limit of the derivative."""
-        if (
-            self.limit != "finite"
-            or not self.predicted_dt
-            or (self.observed_dt is None and self.failing_dt is None)
-        ):
+        if self.limit != "finite" or not self.predicted_dt or self.observed_dt is self.failing_dt is None:
             return False
         holds = self.observed_dt is not None and self.observed_dt >= 0.95 * self.predicted_dt
         fails = self.failing_dt is not None and self.failing_dt <= 1.05 * self.predicted_dt
@@ -111,44 +113,6 @@ class StepLimitRow(Row):
         if self.limit not in ("finite", "none", "moving"):
             return False
         return not 0.95 <= min(self.longest, LONGEST) / (self.predicted_dt or LONGEST) <= 1.05
-
-
-class Posture(NamedTuple):
-    """A posture that is asked for. key: the keyframe, "": qpos0; q: positions instead, (nq,), or ()."""
-
-    name: str
-    key: str
-    q: tuple[float, ...] = ()
-
-
-def postures_of(reading: Reading) -> list[Posture]:
-    """The keyframes, by the names of their postures; qpos0 if there is none."""
-    named = names_of_keys(reading)
-    return [Posture(named[key], key) for key in list(reading.keyframes)[:MOST_POSTURES]] or [
-        Posture("qpos0", "")
-    ]
-
-
-def posture_of(asked: str | Sequence[float], reading: Reading) -> Posture:
-    """The posture of a name, or positions of all joints (deg, m, quaternions); ValueError, in one line, for neither.
-
-    A name may be numbers separated by commas.
-    """
-    named = {posture.name: posture for posture in postures_of(reading)} | {"qpos0": Posture("qpos0", "")}
-    if isinstance(asked, str) and asked in named:
-        return named[asked]
-    coordinates = Coordinates(reading.tree.joint_names, reading.tree.kind)
-    try:
-        numbers = tuple(map(float, asked.split(",") if isinstance(asked, str) else asked))
-    except ValueError:
-        numbers = ()
-    if len(numbers) != len(reading.qpos0) or not np.isfinite(numbers).all():
-        choices = f"{', '.join(named)}, or {len(reading.qpos0)} numbers (deg, m, quaternions)"
-        raise ValueError(f"posture {asked} is not one of this file: expected {choices}")
-    q = coordinates.from_degrees(numbers, positions=True)
-    return Posture(
-        asked if isinstance(asked, str) else ",".join(f"{x:g}" for x in numbers), "", tuple(q.tolist())
-    )
 
 
 def integrators_at_rest() -> list[str]:
@@ -183,14 +147,13 @@ class Asked(NamedTuple):
 
 def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> PlaceAnswer:
     """All that is asked of a posture as it stands, or in the air if that is another place: no rows if it is not."""
-    q = np.array(posture.q) if posture.q else None
-    standing = standing_at(reading, posture.name, posture.key, q)
-    place = standing if contacts else in_the_air_at(standing, posture.key, q)
+    standing = standing_at(reading, posture)
+    place = standing if contacts else in_the_air_at(standing)
     if place is None:
         return PlaceAnswer([], {}, [])
     rows, curves = [], {}
     for integrator in asked.integrators:
-        rows.append(limit_row(place, integrator, asked.dt, asked.integrator, asked.in_runs))
+        rows.append(limit_row(place, integrator, asked))
         if asked.drawn and rows[-1].is_known:
             curves[integrator] = curve(place, rows[-1])
     fails = [row for row in rows if row.integrator == asked.integrator and row.stable_at_file_dt is False]
@@ -202,77 +165,78 @@ def curve(place: Place, row: StepLimitRow) -> Curve:
     """The growth over the step: from an eighth of the file's step to four times the limit, and about the limit in runs."""
     limit_dt = row.predicted_dt or LONGEST / COARSER
     low, high = min(row.file_dt, limit_dt) / 8.0, min(4.0 * max(limit_dt, row.file_dt), LONGEST)
+    beside = [share * limit_dt for share in CURVE_RUNS]
     predicted, state = [], place.rest
-    steps = [*np.geomspace(low, high, CURVE_STEPS), *(share * limit_dt for share in CURVE_RUNS)]
-    for dt in sorted(step for step in steps if step <= high):
+    for dt in sorted(step for step in (*np.geomspace(low, high, CURVE_STEPS), *beside) if step <= high):
         at = tried(place.model, state, float(dt), row.integrator)
         if not at.rest.is_found:
             break
         predicted.append((float(dt), at.growth.factor))
         state = at.rest.state
-    seen = []
-    for share in CURVE_RUNS if row.predicted_dt else ():
-        dt = share * limit_dt
-        seen.append((dt, growth_in_run(place.model, place.rest, dt, row.integrator)))
+    seen = [
+        (dt, growth_in_run(place.model, place.rest, dt, row.integrator)) for dt in beside if row.predicted_dt
+    ]
     return Curve(predicted, [(dt, factor) for dt, factor in seen if factor is not None])
 
 
-def limit_row(
-    place: Place, integrator: str, dt: float, file_integrator: str, in_runs: bool = True
-) -> StepLimitRow:
-    """The limit of an integrator at a place, and what its step of dt, s, does there; in_runs: with what runs show."""
-    model = place.model
+def limit_row(place: Place, integrator: str, asked: Asked) -> StepLimitRow:
+    """The limit of an integrator at a place, and what the step in use does there."""
+    model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
-    at = found.first
-    end = limiting(place, found.rest, found.growth)
+    shows = found.kind == "saddle" and found.growth.rate * LASTS > np.log(CALM / OWN_PUSH)
+    if shows and stays_still(
+        model, place.rest, dt, integrator, place.creep
+    ):  # what grows there remains small
+        found = limit(model, place.rest, integrator, dt, found.growth.rate)
+    at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
+    joint, contact = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
-        posture=place.posture,
-        base="free" if has_free_base(model) else "fixed",
-        surroundings=place.surroundings,
-        integrator=integrator,
-        limit=found.kind.replace(" ", "_"),
-        predicted_dt=found.dt,
-        file_dt=dt,
-        file_integrator=file_integrator,
-        stable_at_file_dt=holds(found, dt),
-        limiting_joint=end.joint,
-        limiting_contact=end.contact,
-        growth_rate=found.growth.rate or None,
-        growth=at.growth.factor,
-    )
-    row.has_fallen = place.has_fallen
-    if moves_on(place, found):
-        row.limit, row.predicted_dt = "moving", None
+        posture=place.posture.name, base="free" if has_free_base(model) else "fixed", surroundings=place.surroundings,
+        integrator=integrator, limit=found.kind.replace(" ", "_"), predicted_dt=found.dt, file_dt=dt,
+        file_integrator=asked.integrator, stable_at_file_dt=holds(found, dt), limiting_joint=joint,
+        limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,
+        has_fallen=place.has_fallen, moved=float(moved.max()), moved_joint=place.speed_names[int(np.argmax(moved))],
+        held_objects=place.held_objects,
+    )  # fmt: skip
+    if at.rest.is_found:  # else the speeds are those that Newton's method has tried
+        row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
+    if at.rest.left <= SETTLED and not place.held_objects:
+        row.apart = radius_apart(at.rest, place.tree)
     if found.dt:
         row.gives_way = float(np.abs(distance(model, place.rest, found.rest.state)).max())
-    add_rest(row, place, at)
-    if place.frictionless is not None and row.is_known:
-        smooth = limit(place.frictionless, place.rest, integrator, dt)
-        row.smooth_dt = smooth.dt
-    if in_runs or row.limit == "moving":
-        add_runs(row, place, found)
+    if place.is_touching and found.kind != "saddle" and (found.kind == "no rest" or place.creep > MOVING):
+        row.limit, row.predicted_dt = "moving", None
+        add_motion(row, place)
+    elif row.is_known:
+        if place.frictionless is not None:
+            row.smooth_dt = limit(place.frictionless, place.rest, integrator, dt).dt
+        if asked.in_runs:
+            add_runs(row, place, found)
     return row
 
 
 def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     """What runs show; they have the last word."""
-    if not row.is_known:
-        return
-    model, creep = place.model, float(np.abs(place.creep).max(initial=0.0))
     if row.limit == "finite":
-        row.observed_dt, row.failing_dt = observed(model, found, row.integrator)
+        row.observed_dt, row.failing_dt = observed(place.model, found, row.integrator)
+    add_own_limit(row, place, place.creep)
+    row.largest_push, row.finer_push = largest_push(place.model, found.first.rest, place.creep)
+
+
+def add_motion(row: StepLimitRow, place: Place) -> None:
+    """Of a robot that touches something and goes on moving: how fast at a finer step, and up to which step no faster."""
+    finer = Step(place.model, row.file_dt / FINER, row.integrator, exact=False)
+    speed = speed_at_end(finer, place.rest)
+    row.creep = speed if np.isfinite(speed) else place.creep
+    row.creeping_joint = place.speed_names[int(np.argmax(np.abs(finer.data.qvel)))]
+    add_own_limit(row, place, row.creep)
+
+
+def add_own_limit(row: StepLimitRow, place: Place, creep: float) -> None:
     if longest := min(row.longest, LONGEST):
-        own = own_limit(model, place.rest, row.integrator, longest, creep)
+        own = own_limit(place.model, place.rest, row.integrator, longest, creep)
         row.own_dt = own if own < longest else None
     row.stable_at_file_dt = row.file_dt <= row.longest
-    row.largest_push, row.finer_push = largest_push(model, found.first.rest, creep)
-
-
-def moves_on(place: Place, found: Limit) -> bool:
-    """Whether a robot that touches something goes on moving there, slowly, and does not fall."""
-    if found.kind == "saddle" or not place.touching:
-        return False
-    return found.kind == "no rest" or bool(np.abs(place.creep).max(initial=0.0) > MOVING)
 
 
 def holds(found: Limit, dt: float) -> bool | None:
@@ -282,11 +246,22 @@ def holds(found: Limit, dt: float) -> bool | None:
     return found.kind == "none" or (found.dt is not None and dt <= found.dt)
 
 
-def add_rest(row: StepLimitRow, place: Place, at: Tried) -> None:
-    """How far the rest is from the posture, how it creeps, and the growth in closed form."""
-    moved, creep = np.abs(place.moved), np.abs(at.rest.speeds)
-    row.moved, row.moved_joint = float(moved.max()), place.speed_names[int(np.argmax(moved))]
-    if at.rest.is_found:  # else what Newton's method has tried
-        row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
-    if at.rest.left <= SETTLED:
-        row.apart = radius_apart(at.rest, place.tree)
+def limiting(place: Place, rest: Rest, growth: Growth) -> tuple[str, str]:
+    """What a mode moves: the speed with most of its kinetic energy w' M w, and the contact that takes most of it in a step.
+
+    A contact takes (J w)' (J M^-1 J' + R)^-1 (J w): the part of w that the solver would stop at once. "" if there is none.
+    """
+    nv = rest.step.model.nv
+    w = growth.shape[nv : 2 * nv]
+    if not np.abs(w).max(initial=0.0) > 0.0:
+        return "", ""
+    M, rows = rows_at(rest.step, rest.state)
+    energies = np.abs(w.conj() * (M @ w))
+    contact, most = "", SHARE * float(np.abs(w.conj() @ M @ w))
+    for number in sorted(set(rows.contact.tolist()) - {-1}):
+        J, R = rows.J[rows.contact == number], rows.R[rows.contact == number]
+        against, A = J @ w, J @ np.linalg.solve(M, J.T) + np.diag(R)
+        taken = float(np.abs(against.conj() @ np.linalg.solve(A, against)))
+        if taken > most:
+            contact, most = contact_name(rest.step.model, rest.step.data, number), taken
+    return place.speed_names[int(np.argmax(energies))], contact

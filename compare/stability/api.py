@@ -11,7 +11,8 @@ import numpy as np
 
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.reading import read
-from .answer import Asked, StepLimitRow, answer, integrators_at_rest, posture_of, postures_of
+from .answer import Asked, StepLimitRow, answer, integrators_at_rest
+from .place import posture_of, postures_of
 
 __all__ = ["StepLimitRow", "step_limits"]
 

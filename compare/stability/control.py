@@ -14,7 +14,7 @@ import numpy as np
 
 from ..engines.mujoco.step import NUDGE, Step
 from ..engines.mujoco.variants import Servo, held_servos, with_servos
-from .deviations import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
+from .growth import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
 from .rest import Rest, rest_near
 
 MOST_PERIOD = 0.5  # s

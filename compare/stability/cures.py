@@ -8,8 +8,8 @@ import numpy as np
 
 from ..engines.mujoco import variants
 from ..engines.mujoco.step import Step
-from .deviations import grows
-from .limits import tried
+from .growth import grows
+from .limits import bisected, tried
 from .rest import rest_near
 
 SPARE = 1.01  # of the step: so far above it a change must hold
@@ -61,10 +61,7 @@ def least_factor(
 
     if not holds(change.most):
         return None
-    low, high = change.first, change.most
-    while high > low * WITHIN:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if holds(middle) else (middle, high)
+    high = bisected(lambda factor: not holds(factor), change.first, change.most, WITHIN)[1]
     changed = change.made(model, high)
     rest = None if changed is None else rest_near(Step(changed, dt, integrator), state)
     return None if rest is None or grows(rest) else high

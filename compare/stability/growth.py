@@ -1,11 +1,14 @@
-"""What grows in a step at rest: the eigenvalues of its derivative that noise of differences does not explain."""
+"""What grows at a rest: eigenvalues of a step that noise of differences does not explain, and small pushes in runs."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 from scipy.linalg import eig
 
-from ..engines.mujoco.step import NUDGE
+from ..engines.mujoco.step import NUDGE, Step
+from ..robots.case import SEED
 from .rest import Rest
 
 OTHER_NUDGE = NUDGE / 3.0  # of the differences that show the noise
@@ -13,6 +16,10 @@ NOISE_TIMES = 3.0  # fold, of the observed noise: what does not exceed it may be
 NOISE_LEAST = 1e-10  # of an entry of the derivative
 NEAR_ONE = 1e-3  # the distance from 1 of an eigenvalue that noise may have split from 1
 GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
+SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
+LASTS, LEAST_STEPS, MOST_STEPS = 4.0, 800, 20_000  # s: of a run, and between which numbers of steps
+LITTLE = 1e-6  # of an activation
+GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 
 
 class Growth(NamedTuple):
@@ -54,3 +61,63 @@ def growth(rest: Rest) -> Growth:
     if factor == 1.0:
         return still._replace(is_uncertain=is_uncertain)
     return Growth(factor, float(np.log(factor)) / rest.step.dt, right[:, fastest], is_uncertain)
+
+
+# runs
+
+
+def grows(rest: Rest, rate: float = 0.0) -> bool:
+    """Whether a small push from a rest grows in a run.
+
+    rate: of the growth that is expected, 1/s; the run lasts until it would show.
+    """
+    if not rest.is_found:
+        return True
+    lasts = max(LASTS, np.log(GROWN) / rate if rate > 0.0 else 0.0)
+    steps = steps_in(lasts, rest.step.dt)
+    plain = speeds_of(rest.step.run(rest.state, steps))
+    return has_grown(apart(rest.step.run(pushed(rest, SMALL_PUSH), steps), plain), steps)
+
+
+def steps_in(lasts: float, dt: float) -> int:
+    return int(np.clip(lasts / dt, LEAST_STEPS, MOST_STEPS))
+
+
+def pushed(rest: Rest, push: float) -> np.ndarray:
+    """The state at rest with a push, rad/s or m/s, of every speed, this way or that by chance, and a little of activations."""
+    return rest.step.moved(rest.state, push_of(rest.step, rest.state, push))
+
+
+def push_of(step: Step, state: np.ndarray, push: float) -> np.ndarray:
+    """The deviation of a push, (n,); activations, which may have any unit, stay within their ranges."""
+    nv, by = step.model.nv, np.zeros(step.size)
+    signs = np.random.default_rng(SEED).choice([-1.0, 1.0], step.size)
+    by[nv : 2 * nv] = push * signs[nv : 2 * nv]
+    little = min(push, LITTLE)
+    for place, (ahead, behind) in enumerate(step.sides(state, little)):
+        if place >= 2 * nv:
+            by += ahead if signs[place] > 0.0 or not behind.any() else behind
+    return by
+
+
+def speeds_of(run: Iterable[mujoco.MjData]) -> np.ndarray:
+    """The speeds after each step of a run, (steps, nv)."""
+    return np.array([data.qvel.copy() for data in run])
+
+
+def apart(run: Iterable[mujoco.MjData], plain: np.ndarray, most: float = GROWN * SMALL_PUSH) -> np.ndarray:
+    """The largest difference of a speed after each step from that of the run without a push, until it exceeds `most`."""
+    sizes = []
+    for data, speeds in zip(run, plain):
+        sizes.append(np.abs(data.qvel - speeds).max())
+        if not sizes[-1] <= most:
+            break
+    return np.array(sizes)
+
+
+def has_grown(sizes: np.ndarray, steps: int) -> bool:
+    """Whether a small push has grown: the run was broken off, or its last quarter is faster than its second."""
+    if len(sizes) < steps or not sizes[-1] <= GROWN * SMALL_PUSH:
+        return True
+    early, late = sizes[steps // 4 : steps // 2].max(), sizes[3 * steps // 4 :].max()
+    return bool(late > GROWING * max(early, SMALL_PUSH))

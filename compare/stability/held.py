@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from scipy.linalg import eig
@@ -12,15 +12,15 @@ import tmt
 from tmt import METHODS, literal
 from tmt.derivation import composite, method
 from tmt.derivation.dual import Dual, seeded
+from tmt.methods import RungeKutta, amplification
+from tmt.methods.implicit import ImplicitRungeKutta
+from tmt.methods.stepping import Method
+from tmt.methods.tableau import Tableau
 
 from ..robots import Robot
 from ..robots.case import SEED, Case
 from ..robots.coordinates import floats
-from .linear_step import growth_of, is_runge_kutta, linear_step
 
-AS_IT_STANDS = (
-    6  # speeds up to which the method is differentiated as written; beyond, composite inertias are faster
-)
 LONGEST_STEP, SHORTEST_STEP = 1e3, 1e-4  # s: the range in which a limit is searched
 SCANNED = 281  # steps in this range, 40 for each power of ten
 NEUTRAL = 1e-9  # growth per step that can be rounding
@@ -73,11 +73,6 @@ class Held:
         return np.concatenate([np.ones(3) if kind == "ball" else self.q[q] for kind, q, _ in joints])
 
     @cached_property
-    def known(self) -> dict[object, tuple[str, float | None]]:
-        """Results of `limit` by method."""
-        return {}
-
-    @cached_property
     def mass_matrix(self) -> np.ndarray:
         return literal.mass_matrix(self.q, self.tree)
 
@@ -89,8 +84,8 @@ class Held:
         state = seeded(
             [*start, *np.zeros(n)], [*self.tree.coordinates.component_rates(start, unit[:n]), *unit[n:]]
         )
-        terms = method.mass_matrix_and_bias if n <= AS_IT_STANDS else composite.mass_matrix_and_bias
-        qdd = method.acceleration(self.tree, state[:nq], state[nq:], [float(t) for t in self.tau], terms)
+        tau = [float(t) for t in self.tau]
+        qdd = method.acceleration(self.tree, state[:nq], state[nq:], tau, composite.mass_matrix_and_bias)
         return np.vstack([unit[n:], slopes(state, qdd)])
 
     @cached_property
@@ -157,7 +152,7 @@ class Held:
 
     def step(self, name: str, dt: float) -> np.ndarray:
         """The amplification matrix of a step of a method of tmt, (2nv, 2nv)."""
-        return linear_step(self, METHODS[name], np.array([dt], float))[0]
+        return amplification(METHODS[name], self.tree, self.q, np.zeros(self.nv), self.tau, dt)
 
     def growth(self, name: str, dt: np.ndarray | float) -> np.ndarray:
         """The spectral radius of `step`, (...) for dt (...). The growth of a mode without stiffness is 1."""
@@ -165,10 +160,11 @@ class Held:
         idle = self.without_stiffness
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             if is_runge_kutta(stepping):
-                return np.abs(growth_of(stepping, dt[..., None] * np.where(idle, 0.0, self.modes[0]))).max(
-                    axis=-1
-                )
-            factors = np.linalg.eigvals(linear_step(self, stepping, np.atleast_1d(dt))).reshape(*dt.shape, -1)
+                z = dt[..., None] * np.where(idle, 0.0, self.modes[0])
+                return np.abs(growth_of(stepping, z)).max(axis=-1)
+            each = np.atleast_1d(dt)[:, None, None]
+            steps = amplification(stepping, self.tree, self.q, np.zeros(self.nv), self.tau, each)
+            factors = np.linalg.eigvals(steps).reshape(*dt.shape, -1)
             if idle.any():
                 near = np.clip(self.small * dt, *AT_ONE)[..., None]
                 factors = np.where(np.abs(factors - 1.0) <= near, 1.0, factors)
@@ -179,11 +175,6 @@ class Held:
 
         The first unstable step of 40 for each power of ten, then refined.
         """
-        if METHODS[name] not in self.known:
-            self.known[METHODS[name]] = self.first_failing(name)
-        return self.known[METHODS[name]]
-
-    def first_failing(self, name: str) -> tuple[str, float | None]:
         low, high = min(SHORTEST_STEP, 1.0 / max(np.abs(self.modes[0]).max(), SLOWEST)), LONGEST_STEP
         for _ in range(4):
             steps = np.geomspace(low, high, SCANNED)
@@ -215,6 +206,26 @@ def held(robot: Robot, posture: str, damping: float = 0.0) -> Held:
     return Held(
         robot.case(f"{posture}, held", posture=posture, torque="hold", damping=damping, gravity=gravity)
     )
+
+
+# the step of a method
+
+
+def is_runge_kutta(stepping: Method) -> TypeGuard[Tableau]:
+    """Whether a method is one of tmt's Runge-Kutta methods, explicit or implicit; a subclass may step otherwise."""
+    return type(stepping) in (RungeKutta, ImplicitRungeKutta)
+
+
+def growth_of(stepping: Tableau, z: np.ndarray) -> np.ndarray:
+    """The stability function of a Runge-Kutta method, 1 + z b (1 - z A)^-1 1, at z = lambda dt, of any shape."""
+    z, stages = np.asarray(z), list[np.ndarray]()
+    if type(stepping) is RungeKutta:
+        for row in stepping.A:
+            stages.append(1.0 + z * sum((a * stage for a, stage in zip(row, stages)), 0.0 * z))
+        return 1.0 + z * sum(b * stage for b, stage in zip(stepping.b, stages))
+    size = len(stepping.b)
+    coupled = np.eye(size) - z[..., None, None] * np.array(stepping.A)
+    return 1.0 + z * (np.linalg.solve(coupled, np.ones((size, 1)))[..., 0] @ np.array(stepping.b))
 
 
 # forces at rest over any scalar, and their derivatives

@@ -1,13 +1,13 @@
 """The largest stable step of an integrator at the rest of a model, by the derivative of MuJoCo's own step."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .deviations import grows
-from .growth import GROWS, Growth, growth
+from .growth import GROWS, Growth, grows, growth
 from .rest import Rest, rest_near
 
 LONGEST, SHORTEST = 0.4, 1e-6  # s: steps that are tried
@@ -77,9 +77,9 @@ def limit(
         finer = tried(model, state, at.dt / COARSER**2, integrator, drift)
         if finer.is_stable:
             stable = finer
+        elif is_saddle(at, finer):
+            return Limit("saddle", None, finer.growth, finer.rest, began)
         elif grows_by_itself(at, finer):
-            if finer.growth.rate > SADDLE:
-                return Limit("saddle", None, finer.growth, finer.rest, began)
             return limit(model, state, integrator, first, finer.growth.rate)
         elif not (at.rest.is_found or finer.rest.is_found):
             return Limit("no rest", None, finer.growth, finer.rest, began)
@@ -96,8 +96,21 @@ def limit(
     return Limit("finite", stable.dt, failing.growth, stable.rest, began)
 
 
+def is_saddle(coarse: Tried, fine: Tried) -> bool:
+    """Whether something grows by itself, faster than a drift."""
+    return grows_by_itself(coarse, fine) and fine.growth.rate > SADDLE
+
+
 def grows_by_itself(coarse: Tried, fine: Tried) -> bool:
     """Whether something grows slowly, and as fast at a finer step."""
     low, high = BY_ITSELF
     kept = low * coarse.growth.rate < fine.growth.rate < high * coarse.growth.rate
     return kept and fine.rest.is_found and coarse.growth.factor < SLOW
+
+
+def bisected(holds: Callable[[float], bool], low: float, high: float, within: float) -> tuple[float, float]:
+    """The largest step that holds and the smallest that fails, s, a factor `within` apart; at first low and high."""
+    while high > low * within:
+        middle = float(np.sqrt(low * high))
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low, high

@@ -1,47 +1,48 @@
 """Small deviations of a motion: the product of the derivatives of the steps along a run, beside that of finer steps."""
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
+from ..core.rows import Row, column
 from ..engines.mujoco.step import Step
+from .place import Place
 
 RUN_FOR = 4.0  # s: of the run that may break off
 LASTS, LEAST_STEPS, MOST_STEPS = 0.5, 20, 500  # s: of the deviations, and between which numbers of steps
 FINER = 8  # fold: of the steps that stand for the exact motion
-FASTER = 1.5  # fold, and by at least FASTER_BY, 1/s: by the step alone
-FASTER_BY = 1.0
+FASTER, FASTER_BY = 1.5, 1.0  # fold, and by at least, 1/s: by the step alone
 
 
-class Motion(NamedTuple):
-    """How fast deviations of a motion grow, 1/s, by its step and by fine steps, within `lasts`, s.
+@dataclass(kw_only=True)
+class MotionRow(Row):
+    """How deviations grow along the run from a posture with its speeds, within `lasts`: motion_stability.csv.
 
-    failed_at: s, when a run of 4 s breaks off; None: it does not.
+    rate, exact_rate: by its step and by fine steps. failed_at: when a run of 4 s breaks off; None: it does not.
     """
 
-    rate: float
-    exact_rate: float
-    lasts: float
-    failed_at: float | None
-
-    @property
-    def is_stable(self) -> bool:
-        return self.failed_at is None and self.rate <= max(
-            FASTER * self.exact_rate, self.exact_rate + FASTER_BY
-        )
+    posture: str
+    integrator: str
+    dt: float = column("s", digits=4)
+    rate: float = column("per_s")
+    exact_rate: float = column("per_s")
+    lasts: float = column("s")
+    failed_at: float | None = column("s")
+    passed: bool
 
 
-def motion(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str) -> Motion:
-    """The growth along the run from a state with its speeds."""
-    step, count = Step(model, dt, integrator), round(RUN_FOR / dt)
-    lasted = sum(1 for _ in step.run(state, count))
+def motion(place: Place, dt: float, integrator: str) -> MotionRow:
+    """The growth along the run from a place's start with its speeds."""
+    step, count = Step(place.model, dt, integrator), round(RUN_FOR / dt)
+    lasted = sum(1 for _ in step.run(place.start, count))
     steps = min(int(np.clip(LASTS / dt, LEAST_STEPS, MOST_STEPS)), lasted)
-    rate, exact = (
-        growth_along(step, state, steps),
-        growth_along(Step(model, dt / FINER, "RK4"), state, FINER * steps),
-    )
-    return Motion(rate, exact, steps * dt, lasted * dt if lasted < count else None)
+    rate = growth_along(step, place.start, steps)
+    exact = growth_along(Step(place.model, dt / FINER, "RK4"), place.start, FINER * steps)
+    return MotionRow(
+        posture=place.posture.name, integrator=integrator, dt=dt, rate=rate, exact_rate=exact, lasts=steps * dt,
+        failed_at=lasted * dt if lasted < count else None,
+        passed=lasted == count and rate <= max(FASTER * exact, exact + FASTER_BY),
+    )  # fmt: skip
 
 
 def growth_along(step: Step, state: np.ndarray, steps: int) -> float:

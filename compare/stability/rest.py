@@ -22,8 +22,11 @@ TRIES, SHARES = (
 )  # of Newton's method, and the parts of its step that are tried
 REACH = 0.05  # rad or m: its longest step
 UNHELD = 1e-6  # of the largest slope of a force: none
-# of the largest singular value: softer directions are moved only if the stiffer ones do not help
-DEPENDENT = 1e-4, 1e-6, 1e-9
+DEPENDENT = (
+    1e-4,
+    1e-6,
+    1e-9,
+)  # of the largest singular value: softer directions move only if the stiffer do not help
 RELAXED_STEPS = 1e-3, 5e-4  # s, the longest step of a relaxed run, and of a file with a shorter one
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s
@@ -81,21 +84,17 @@ def relaxed(model: mujoco.MjModel, state: np.ndarray) -> np.ndarray:
         step, end = Step(model, dt, integrator), state
         for seconds, rate in RELAXED:
             end = step.relaxed(end, seconds, rate, RELAXED_STILL)
-            if is_still(step, end):
+            if fastest(step, end) < RELAXED_STILL:
                 return end
-        if not is_wild(step, end):
+        if fastest(step, end) < WILD:
             return end
     return state
 
 
-def is_wild(step: Step, state: np.ndarray) -> bool:
+def fastest(step: Step, state: np.ndarray) -> float:
+    """The largest speed of a state, rad/s or m/s."""
     step.put(state)
-    return not np.abs(step.data.qvel).max(initial=0.0) < WILD
-
-
-def is_still(step: Step, state: np.ndarray) -> bool:
-    step.put(state)
-    return bool(np.abs(step.data.qvel).max(initial=0.0) < RELAXED_STILL)
+    return float(np.abs(step.data.qvel).max(initial=0.0))
 
 
 def rest_near(step: Step, state: np.ndarray) -> Rest:
@@ -113,7 +112,7 @@ def rest_near(step: Step, state: np.ndarray) -> Rest:
             if not np.abs(data.qvel).max() < WILD:
                 break
         end = step.state()
-        if np.isfinite(end).all() and not is_wild(step, end):
+        if np.isfinite(end).all() and fastest(step, end) < WILD:
             again = newton(step, end)
             best = min(best, again, key=lambda rest: rest.left)
     return best

@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .deviations import GROWN, LASTS, SMALL_PUSH, apart, grows, push_of, pushed, speeds_of, steps_in
-from .limits import COARSER, LONGEST, SHORTEST, Limit
+from .growth import GROWN, LASTS, SMALL_PUSH, apart, grows, push_of, pushed, speeds_of, steps_in
+from .limits import COARSER, LONGEST, SHORTEST, Limit, bisected
 from .rest import Rest, rest_near
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
-WITHIN = 1.07  # fold: how near they are then
+WITHIN, OWN_WITHIN = 1.07, 1.03  # fold: how near they are then; and those of a file's own run
 OWN_PUSH = 1e-6  # rad/s or m/s: at the start of a file's own run
 CURVE_STEPS, LEAST_SIZES = (
     400,
@@ -19,7 +19,7 @@ PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest
 FAR = 0.5  # rad or m: from a rest to what is another one
-AS_FAST, AS_FAST_ALONE, WILD = 2.0, 10.0, 1e3  # fold: of the creep, after a push and without; more has failed
+AS_FAST, AS_FAST_ALONE, WILD = 2.0, 4.0, 1e3  # fold: of the creep, after a push and without; more has failed
 THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
 FINER = 8  # the step over the one that shows whether the robot itself bears a push
 
@@ -78,7 +78,7 @@ def own_limit(
 ) -> float:
     """The longest step up to `longest`, s, at which the file's own run from a state stays still, or as slow as its creep.
 
-    By the file's own solver, without searching a rest for each step; within 7 %. 0.0: at none.
+    By the file's own solver, without searching a rest for each step; within 3 %. 0.0: at none.
     """
 
     def holds(step: float) -> bool:
@@ -89,22 +89,27 @@ def own_limit(
         low, high = low / COARSER, low
         if low < SHORTEST:
             return 0.0
-    while high > low * WITHIN:
-        middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if holds(middle) else (low, middle)
+    while low * OWN_WITHIN < high and holds(low * OWN_WITHIN):  # upwards: a longer one may hold beyond a gap
+        low *= OWN_WITHIN
     return low
 
 
 def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, creep: float) -> bool:
-    """Whether the file's own run from where it sank to stays still."""
+    """Whether the file's own run from where it sank to stays there, still."""
     step = Step(model, dt, integrator, exact=False)
-    steps, speeds = steps_in(LASTS, dt), []
-    start = step.moved(state, push_of(step, state, OWN_PUSH))
-    for data in step.run(start, steps):
-        speeds.append(np.abs(data.qvel).max())
-        if not speeds[-1] <= WILD * max(CALM, creep):
-            return False
-    return len(speeds) == steps and bool(max(speeds[-steps // 8 :]) <= max(CALM, AS_FAST_ALONE * creep))
+    speed = speed_at_end(step, state, WILD * max(CALM, creep))
+    moved = float(np.abs(distance(model, state, step.state())).max(initial=0.0))
+    return speed <= max(CALM, AS_FAST_ALONE * creep) and moved <= FAR + creep * LASTS
+
+
+def speed_at_end(step: Step, state: np.ndarray, most: float = np.inf) -> float:
+    """The largest speed in the last eighth of a run from a state after a small push; inf: it fails, or exceeds `most`."""
+    steps, speeds = steps_in(LASTS, step.dt), []
+    for data in step.run(step.moved(state, push_of(step, state, OWN_PUSH)), steps):
+        speeds.append(float(np.abs(data.qvel).max()))
+        if not speeds[-1] <= most:
+            return np.inf
+    return max(speeds[-steps // 8 :]) if len(speeds) == steps else np.inf
 
 
 def observed(model: mujoco.MjModel, limit: Limit, integrator: str) -> tuple[float | None, float | None]:
@@ -127,7 +132,4 @@ def observed(model: mujoco.MjModel, limit: Limit, integrator: str) -> tuple[floa
         low, high = high, high * COARSER
         if high > LONGEST:
             return low, None
-    while high > low * WITHIN:
-        middle = float(np.sqrt(low * high))
-        low, high = (low, middle) if fails(middle) else (middle, high)
-    return low, high
+    return bisected(lambda dt: not fails(dt), low, high, WITHIN)

@@ -1,8 +1,7 @@
 """Reference runs for errors: Taylor's method in pairs of doubles, for any robot and any scene.
 
-A second run with another form of the equations and another order gives the accuracy. Where a series takes
-too long, as for a stiff robot, the reference is a run in doubles of order 8. Halving its steps gives its
-accuracy.
+A second run with another form of the equations and another order gives the accuracy. Where a series takes too long, as
+for a stiff robot, the reference is a run in doubles of order 8. Halving its steps gives its accuracy.
 """
 
 from functools import lru_cache
@@ -18,7 +17,7 @@ from ..core.finding import Finding
 from ..robots import Robot
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates, rates_at
-from ..stability.linear_step import growth_of, is_runge_kutta
+from ..stability.held import growth_of, is_runge_kutta
 
 RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
@@ -85,8 +84,8 @@ def in_doubles(case: Case) -> Reference:
         motion = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)
         q, qd = motion.q[:: count // RECORDS], motion.qd[:: count // RECORDS]
         if before:
-            apart = case.coordinates.difference(q, before[0]), qd - before[1]
-            runs.append((np.abs(np.concatenate(apart, axis=1)).max(), np.concatenate([q, qd], axis=1), count))
+            apart = np.abs(np.hstack([case.coordinates.difference(q, before[0]), qd - before[1]])).max()
+            runs.append((float(apart), np.hstack([q, qd]), count))
             if len(runs) > 1 and np.isfinite(runs[-2][0]) and not runs[-1][0] < runs[-2][0] / 2.0:
                 break
         before, count = (q, qd), 2 * count
@@ -94,7 +93,7 @@ def in_doubles(case: Case) -> Reference:
     if not np.isfinite(apart):
         tried = f"scene {case.name!r}: runs with up to {runs[-1][2]} steps of {DOUBLES} diverge"
         raise ValueError(f"{tried}; expected a slower start or a shorter scene")
-    return Reference(times(case), high, np.zeros_like(high), float(apart), steps, case.coordinates)
+    return Reference(times(case), high, np.zeros_like(high), apart, steps, case.coordinates)
 
 
 def has_no_reference(robot: Robot) -> Finding | None:

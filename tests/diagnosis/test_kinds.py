@@ -14,6 +14,7 @@ from compare.diagnosis.likelihood import NATURAL, cost
 from compare.diagnosis.model import Equations, Layout
 from compare.diagnosis.recursion import SLIPS, Recursion, slips_of_recursion
 from compare.engines.mujoco import reading
+from compare.robots.coordinates import Coordinates
 from compare.robots.joint_map import joint_map
 
 READ = {name: reading.read(PATHS[name]).tree for name in ("free_body", "mixed", "quadruped")}
@@ -25,10 +26,7 @@ ROW = replace(  # three parallel hinges and slides between, two bodies alike
 
 
 def states(tree, count=12):
-    rng, coordinates = (
-        np.random.default_rng(1),
-        Equations(tree, np.zeros((1, 1)), np.zeros((1, 1))).coordinates,
-    )
+    rng, coordinates = np.random.default_rng(1), Coordinates(tree.joint_names, tree.kind)
     q = coordinates.move(np.tile(tree.zero, (count, 1)), rng.uniform(-2.0, 2.0, (count, coordinates.nv)))
     return q, rng.uniform(-2.0, 2.0, (count, coordinates.nv))
 
@@ -47,6 +45,16 @@ def parts(tree):
     return Equations(tree, *states(tree)).parts
 
 
+def convention_of(tree, place):
+    """The first of a place or with this explanation."""
+    every = all_conventions(Equations(tree, *states(tree)))
+    return next(one for one in every if place in (one.cause.place, one.cause.explains))
+
+
+def places(diagnosis):
+    return [cause.place for cause in diagnosis.causes]
+
+
 def first(diagnosis):
     cause = diagnosis.causes[0]
     return cause.place, cause.explains
@@ -60,19 +68,14 @@ CONVENTIONS = [  # a model, and the cause of the convention
 
 @pytest.mark.parametrize("tree, place", CONVENTIONS)
 def test_a_convention_is_named(tree, place):
-    equations = Equations(tree, *states(tree))
-    convention = next(
-        convention for convention in all_conventions(equations) if convention.cause.place == place
-    )
+    convention = convention_of(tree, place)
     inner = Equations(tree, convention.q, convention.qd)
-    found = of_parts(tree, *convention.applied(*inner.parts))
-    assert place in [cause.place for cause in found.causes]
+    assert place in places(of_parts(tree, *convention.applied(*inner.parts)))
     M, h, rest = convention.removed(*(inner.parts[0],) * 2, inner.h, inner.parts[2])
     there = convention.applied(M, h - rest, rest)  # there and back
     drift = np.einsum("sij,sj->si", M - inner.parts[0], convention.drift)
-    assert np.allclose(there[0], inner.parts[0]) and np.allclose(
-        there[1] + there[2], inner.h + drift[:, :0].sum()
-    )
+    assert np.allclose(there[0], inner.parts[0])
+    assert np.allclose(there[1] + there[2], inner.h + drift[:, :0].sum())
 
 
 def test_the_axes_of_velocities_are_those_of_the_kinetic_energy():
@@ -84,19 +87,17 @@ def test_the_axes_of_velocities_are_those_of_the_kinetic_energy():
             inner = Equations(STONE, convention.q, convention.qd).parts
             M, _, rest = convention.applied(*inner)
             v = np.einsum("sij,sj->si", convention.S, speeds)
-            assert np.allclose(
-                np.einsum("si,sij,sj->s", speeds, M, speeds), np.einsum("si,sij,sj->s", v, inner[0], v)
-            )
+            kinetic = (np.einsum("si,sij,sj->s", u, mass, u) for u, mass in ((speeds, M), (v, inner[0])))
+            assert np.allclose(*kinetic)
             assert np.allclose((rest * speeds).sum(axis=1), (inner[2] * v).sum(axis=1))
 
 
 def test_a_body_with_its_linear_velocity_in_its_own_axes_has_omega_x_v():
     """m (vdot + omega x v) of a point at the CoM: the drift of the convention."""
     point = replace(STONE, com=((0.0, 0.0, 0.0),), gravity=(0.0, 0.0, 0.0))
-    equations = Equations(point, *states(point))
-    convention = next(one for one in all_conventions(equations) if one.cause.explains == "in body axes")
+    (_, qd), convention = states(point), convention_of(point, "in body axes")
     _, velocity_terms, _ = convention.applied(*Equations(point, convention.q, convention.qd).parts)
-    omega_x_v = np.cross(equations.qd[:, 3:], equations.qd[:, :3])
+    omega_x_v = np.cross(qd[:, 3:], qd[:, :3])
     assert np.allclose(velocity_terms[:, :3], point.mass[0] * omega_x_v)
 
 
@@ -114,8 +115,7 @@ def test_the_order_of_many_joints_is_named_as_it_is_stated():
 
 
 def test_a_convention_and_a_number_are_named_together():
-    heavy, equations = replace(ROW, mass=(1.9, 1.52)), Equations(ROW, *states(ROW))
-    convention = next(one for one in all_conventions(equations) if one.cause.place == "angle of gamma")
+    heavy, convention = replace(ROW, mass=(1.9, 1.52)), convention_of(ROW, "angle of gamma")
     found = of_parts(ROW, *convention.applied(*Equations(heavy, convention.q, convention.qd).parts))
     assert found.causes[0].place == "angle of gamma and mass of second"
 
@@ -135,8 +135,7 @@ def test_numbers_that_change_together_are_one_cause(fields, place):
     tree = ARM
     for name, value in fields.items():
         object.__setattr__(tree := replace(tree), name, np.array(value, float).tolist())
-    found = of_parts(ARM, *Equations(tree, *states(ARM)).parts)
-    assert place in [cause.place for cause in found.causes]
+    assert place in places(of_parts(ARM, *parts(tree)))
 
 
 def test_a_load_is_named_with_its_mass_and_place():
@@ -146,13 +145,10 @@ def test_a_load_is_named_with_its_mass_and_place():
     tensor = I + load
     for mass, at in ((m, c), (0.4, point)):
         tensor = tensor + mass * (np.dot(at - com, at - com) * np.eye(3) - np.outer(at - com, at - com))
-    loaded = replace(
-        arm, mass=(1.9, m + 0.4), com=(arm.com[0], com.tolist()), inertia=(arm.inertia[0], tensor.tolist())
-    )
-    place, explains = first(of_parts(arm, *parts(loaded)))
-    assert place == "a load on forearm" and explains.startswith(
-        "0.4 kg, CoM (0.3, 0.02, 0.01) m, xx 0.001, yy 0.002, zz 0.003"
-    )
+    fields = {"com": (arm.com[0], com.tolist()), "inertia": (arm.inertia[0], tensor.tolist())}
+    place, explains = first(of_parts(arm, *parts(replace(arm, mass=(1.9, m + 0.4), **fields))))
+    assert place == "a load on forearm"
+    assert explains.startswith("0.4 kg, CoM (0.3, 0.02, 0.01) m, xx 0.001, yy 0.002, zz 0.003")
 
 
 @pytest.mark.parametrize("tree", READ.values(), ids=READ)
@@ -184,7 +180,7 @@ def test_a_slip_of_the_recursion_is_named(place):
     equations = Equations(ARM, *states(ARM), layout)
     given = next(values for cause, values in slips_of_recursion(equations) if cause.place == place)
     M, velocity_terms, rest = given[:, :9].reshape(-1, 3, 3), given[:, 9:12], given[:, 12:]
-    assert place in [cause.place for cause in of_parts(ARM, M, velocity_terms, rest).causes]
+    assert place in places(of_parts(ARM, M, velocity_terms, rest))
 
 
 def test_a_cause_in_parts_of_the_equations_alone():
@@ -208,13 +204,11 @@ def test_h_by_the_derivatives_of_a_wrong_mass_matrix_is_the_same_cause():
 
 
 def test_a_slip_beside_a_number():
-    tree = replace(
-        ARM, mass=(1.8, 1.5), inertia=(ARM.inertia[0], np.diag(np.diag(TENSOR)[[2, 1, 0]]).tolist())
+    tensor = np.diag(np.diag(TENSOR)[[2, 1, 0]]).tolist()
+    place, mass = first(
+        of_parts(ARM, *parts(replace(ARM, mass=(1.8, 1.5), inertia=(ARM.inertia[0], tensor))))
     )
-    assert first(of_parts(ARM, *parts(tree))) == (
-        "inertia of forearm, axes x and z exchanged and mass of upper arm",
-        "1.8",
-    )
+    assert (place, mass) == ("inertia of forearm, axes x and z exchanged and mass of upper arm", "1.8")
 
 
 def test_a_length_in_mm_is_judged_on_its_own_scale():

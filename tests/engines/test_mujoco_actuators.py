@@ -9,6 +9,7 @@ from models import PATHS
 
 import tmt
 from compare.engines.mujoco import read
+from compare.engines.mujoco.step import Step, start_of
 from compare.engines.mujoco.variants import add_armature
 from compare.engines.tmt import Tmt
 
@@ -79,6 +80,19 @@ def test_a_law_that_is_not_known_is_refused_by_name_and_the_rest_is_done(text):
 def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expected):
     controls = read(text_of(actuators, keys=KEYS.format(key))).drive.controls
     assert controls.get("home") == expected and "plain" not in controls
+
+
+@pytest.mark.parametrize("key, activations", [
+    ('ctrl="0.5 0.25" act="0.1 0.2"', (0.1, 0.2)), ('ctrl="0.5 0.25"', (0.5, 0.25)),
+])  # fmt: skip
+def test_a_run_starts_with_the_activations_of_its_keyframe_else_where_the_controls_lead(key, activations):
+    filters = (
+        '<general joint="j" dyntype="filter" dynprm="0.1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
+    )
+    reading = read(text_of(filters, keys=KEYS.format(key)))
+    step = Step(reading.model, 1e-3, "Euler")
+    step.put(start_of(reading.model, reading.drive, "home", np.zeros(2)))
+    assert tuple(step.data.act) == activations and tuple(step.data.ctrl) == (0.5, 0.25)
 
 
 def mass_matrix(model):

@@ -9,9 +9,9 @@ from models import PATHS
 from trees import random_states
 
 import tmt
-from compare.engines.mujoco import calls, engine, load, parse, read
+from compare.engines.mujoco import calls, engine, parse, read
 from compare.engines.mujoco.calls import TINY_STEP, MinimalCalls
-from compare.engines.mujoco.linear import left_to_itself, transition
+from compare.engines.mujoco.differences import left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
@@ -43,7 +43,7 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
     """And so are what MuJoCo says of its own steps, and the numbers that it compiled."""
     robot = crane(tmp_path)
     case = robot.case("damped", damping=0.2)
-    dynamics, (q, v, tau), dt = load(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
+    dynamics, (q, v, tau), dt = parse(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
     ours, motion = tmt.simulate(q, v, tau, dt, 5, "rk4", case.tree), dynamics.run(q, v, tau, dt, 5, "RK4")
     assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
     alone = left_to_itself(dynamics, q, v, tau, dt, 5, "Euler")

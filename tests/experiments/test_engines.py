@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from edited import setup_of
+from trees import tree_of_kinds
 
 from compare import engines
 from compare.core.check import About, Result
 from compare.engines import EngineRecord, Method
-from compare.engines.outside.model import FROM_FILE, combined, numbers_of, size_of
+from compare.engines.outside.model import FROM_FILE, File, ReadModel, combined, links_of, numbers_of, size_of
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
 from compare.judge.entries import Entries
@@ -245,6 +246,41 @@ def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_
     command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
     run = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)
     assert run.stdout.splitlines() == ["(1, 2) (1, 2, 2) 1", "its process was killed"] * 2, run.stderr
+
+
+class OfTree(ReadModel):
+    """A Tree as an engine that tells where its bodies are."""
+
+    has_places = True
+
+    def __init__(self, tree):
+        self.tree, self.stated = tree, numbers_of(tree)
+        self.file = File(ROOT, tree.joint_names, tree.kind)
+
+    def fields(self):
+        return {}
+
+    def links(self, q):
+        return links_of(self.tree, q)
+
+
+@pytest.mark.parametrize("number", ("axis", "offset", "mass"))
+def test_axes_anchors_and_masses_are_those_by_which_the_bodies_move(number):
+    """Of joints of all kinds; and with another axis, another place of a joint, another mass."""
+    right = tree_of_kinds(np.random.default_rng(3))
+    model = OfTree(right)
+    for name, values in model.numbers().items():
+        assert np.abs(values - model.stated[name]).max() <= 1e-13 * max(1.0, size_of(model.stated, name)), (
+            name
+        )
+    wrong = {
+        "axis": np.roll(right.axis, 1, axis=1),
+        "offset": np.add(right.offset, 0.1),
+        "mass": np.multiply(right.mass, 2.0),
+    }
+    model.tree = dataclasses.replace(right, **{number: wrong[number].tolist()})
+    read = {"offset": "anchor"}.get(number, number)
+    assert np.abs(model.numbers()[read] - model.stated[read]).max() > 1e-3
 
 
 def test_bodies_that_move_as_one():

@@ -81,6 +81,17 @@ class Diverging:
         return Off()
 
 
+@pytest.mark.parametrize("damping, why", ((0.2, "damping_implicit"), (1.0, "reading")))
+def test_a_response_is_explained_by_what_was_read_where_that_changes_it(setup, damping, why):
+    result, case = EnginesResult("engines", tables={"engines_servos": []}), servos.scene_of(setup)
+    engine = setup.engines["mujoco"]
+    method = engine.methods["implicitfast"]
+    row = servos.add_response(result, setup, case, engine, method)
+    more = dataclasses.replace(case, scene=dataclasses.replace(case.scene, damping=damping - 0.2))
+    servos.add_as_read(result, case, engine.of(more), method, row)
+    assert [row.why for row in result.tables["engines_servos"]] == ["damping_implicit", why]
+
+
 def test_the_law_that_other_engines_get_is_that_of_the_actuators(setup):
     case = servos.scene_of(setup)
     law = servos_of(case)

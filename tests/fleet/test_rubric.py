@@ -40,8 +40,14 @@ def test_what_is_wrong_in_a_rubric_is_one_line(content, word, tmp_path):
     assert len(str(refused.value).splitlines()) == 1 and "points.toml" in str(refused.value)
 
 
-def check(experiment, quantity, scene, passed):
-    return {"experiment": experiment, "quantity": quantity, "scene": scene, "passed": passed}
+def report(tmp_path, name, checks):
+    """Write the report of a file with checks (experiment, quantity, scene, passed)."""
+    folder = tmp_path / place_of_report(name)
+    folder.mkdir(parents=True)
+    fields = "experiment", "quantity", "scene", "passed"
+    content = {"checks": [dict(zip(fields, check)) for check in checks]}
+    (folder / "results.json").write_text(json.dumps(content))
+    return FileRow(file=name, verdict=AGREE, has_report=True)
 
 
 @pytest.mark.parametrize("checks, points", [
@@ -51,32 +57,22 @@ def check(experiment, quantity, scene, passed):
     ([("gravity", "Mbar", "bent", True)], 0.0),
 ])  # fmt: skip
 def test_all_checks_of_an_entry_must_pass_and_one_at_least_be_there(checks, points, tmp_path):
-    rubric, rows = read(tmp_path, RIGHT), []
-    every = [
-        check("parameters", "", "", True),
-        check("mass", "Mbar", "", True),
-        check("mass", "M", "bent", True),
-    ]
-    for name, content in {"a.xml": [check(*each) for each in checks], "b.xml": every}.items():
-        report = tmp_path / place_of_report(name)
-        report.mkdir(parents=True)
-        (report / "results.json").write_text(json.dumps({"checks": content}))
-        rows.append(FileRow(file=name, verdict=AGREE, has_report=True))
-    rows += [
-        FileRow(file="c.xml", verdict=REFUSED),
-        FileRow(file="d.xml", verdict=AGREE, has_report=True, same_as="a.xml"),
-    ]
+    rubric = read(tmp_path, RIGHT)
+    every = [("parameters", "", "", True), ("mass", "Mbar", "", True), ("mass", "M", "bent", True)]
+    rows = [report(tmp_path, "a.xml", checks), report(tmp_path, "b.xml", every)]
+    rows.append(FileRow(file="c.xml", verdict=REFUSED))
+    rows.append(FileRow(file="d.xml", verdict=AGREE, has_report=True, same_as="a.xml"))
     rubric.award(rows, tmp_path)
     assert [row.points for row in rows] == [points, 6.0, 0.0, points] and rubric.total == 6.0
 
 
 def test_a_check_that_no_file_has_is_named_with_those_that_are_known(tmp_path):
-    report = tmp_path / place_of_report("a.xml")
-    report.mkdir(parents=True)
-    (report / "results.json").write_text(json.dumps({"checks": [check("mass", "Mbar", "bent", True)]}))
-    rubric = read(tmp_path, "[mass]\nNbar = 1")
+    rubric, row = (
+        read(tmp_path, "[mass]\nNbar = 1"),
+        report(tmp_path, "a.xml", [("mass", "Mbar", "bent", True)]),
+    )
     with pytest.raises(Refused, match="mass: no file has a check 'Nbar'; known: Mbar"):
-        rubric.award([FileRow(file="a.xml", verdict=AGREE, has_report=True)], tmp_path)
+        rubric.award([row], tmp_path)
     rubric.award([FileRow(file="a.xml", verdict=REFUSED)], tmp_path)  # no report: nothing is known
 
 

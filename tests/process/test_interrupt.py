@@ -15,10 +15,10 @@ from compare.__main__ import main
 
 ROLLOUT = """
 import numpy as np
-from compare.engines.mujoco import load
+from compare.engines.mujoco import parse
 from compare.robots.arm import ARM
 
-dynamics = load(ARM.mjcf, ARM.tree).of(ARM.case())
+dynamics = parse(ARM.mjcf, ARM.tree).of(ARM.case())
 _, run = dynamics.runner((np.zeros(3),) * 3, 1e-4, 500_000, "RK4", None)
 print("now", flush=True)
 run()  # some seconds in C

@@ -65,10 +65,8 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
 
 def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):
     cells = make_dataclass("Cells", ["text", "number", "count"], bases=(Row,))
-    assert (
-        files.csv([cells("=1+1", -1.5, 2), cells("-x", math.nan, None)])
-        == "text,number,count\n'=1+1,-1.5,2\n'-x,,\n"
-    )
+    rows = [cells("=1+1", -1.5, 2), cells("-x", math.nan, None)]
+    assert files.csv(rows) == "text,number,count\n'=1+1,-1.5,2\n'-x,,\n"
     Terminal().say("a\x1b[31m\u202e[red]")
     assert capsys.readouterr().out == "a\\x1b[31m\\u202e[red]\n"
     figure = Figure()

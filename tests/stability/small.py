@@ -8,7 +8,7 @@ from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.step import Step
 from compare.stability.limits import limit
-from compare.stability.place import standing_at
+from compare.stability.place import Posture, standing_at
 from compare.stability.rest import rest_near
 
 INERTIA = 0.05  # kg m2, of the one hinge
@@ -117,7 +117,7 @@ def place_of(text):
         if "discrete" in INTEGRATORS:
             raise
         pytest.skip(f"not in this MuJoCo: {error}")
-    return standing_at(reading, "start", next(iter(reading.keyframes), ""))
+    return standing_at(reading, Posture("start", next(iter(reading.keyframes), "")))
 
 
 def rest_of(text, dt=2e-3, integrator="Euler"):

@@ -70,9 +70,8 @@ def test_limits_of_one_hinge_are_those_of_the_formula():
     for integrator, off in (("Euler", -kv), ("implicitfast", kv)):
         exact = (off + np.sqrt(off**2 + 4.0 * INERTIA * kp)) / kp
         found = limit_of(hinge(kp, kv), integrator)
-        assert (found.kind, found.dt) == (
-            ("finite", pytest.approx(exact, rel=3e-3)) if exact < 0.1 else ("none", None)
-        )
+        expected = ("finite", pytest.approx(exact, rel=3e-3)) if exact < 0.1 else ("none", None)
+        assert (found.kind, found.dt) == expected
     filtered = '<general joint="turn" dyntype="filter" dynprm="0.004" gainprm="20" biastype="affine" biasprm="0 -20 -0.1"/>'
     assert limit_of(hinge(actuator=filtered), "implicitfast").dt == pytest.approx(0.008, rel=3e-3)
     exactly = filtered.replace('"filter"', '"filterexact"')
@@ -126,9 +125,8 @@ def test_activations_are_left_out_of_rk4_on_both_sides_and_none_that_moves_with_
         assert abs(radius_apart(rest_of(text, integrator="RK4"), place_of(text).tree)) < 1e-8
     inductive = hinge(actuator='<dcmotor joint="turn" motorconst="0.8" resistance="2" inductance="0.004"/>')
     for integrator, known in (("Euler", True), ("RK4", False)):
-        assert (
-            radius_apart(rest_of(inductive, 1e-3, integrator), place_of(inductive).tree) is not None
-        ) is known
+        apart = radius_apart(rest_of(inductive, 1e-3, integrator), place_of(inductive).tree)
+        assert (apart is not None) is known
 
 
 def test_a_wrong_mass_is_seen_in_the_closed_form():
@@ -146,7 +144,7 @@ def test_noise_of_differences_and_what_nothing_holds_never_grow():
             for dt in (1e-4, 2e-3, 0.05):
                 assert growth(rest_of(text, dt, integrator)).factor == 1.0
         assert limit_of(text).growth.factor == 1.0  # its contacts may give way, at a long step
-    assert in_the_air_at(place_of(KINDS["a box"]), "").surroundings == "air"
+    assert in_the_air_at(place_of(KINDS["a box"])).surroundings == "air"
 
 
 @pytest.mark.parametrize("noise, factor", [(0.0, 1.0002), (1e-6, 1.0002), (4e-5, 1.0)])
@@ -154,7 +152,6 @@ def test_what_noise_splits_from_one_does_not_grow(noise, factor):
     """A double eigenvalue 1: an entry e splits it by the root of e dt, which is growth unless it may be noise."""
     dt, entry = 1e-3, 4e-5
     A, other = (np.array([[1.0, dt], [below, 1.0]]) for below in (entry, entry - noise))
-    rest = SimpleNamespace(
-        A=A, state=None, step=SimpleNamespace(dt=dt, derivative=lambda state, nudge: other)
-    )
+    step = SimpleNamespace(dt=dt, derivative=lambda state, nudge: other)
+    rest = SimpleNamespace(A=A, state=None, step=step)
     assert growth(rest).factor == pytest.approx(factor, rel=1e-9)

@@ -71,12 +71,11 @@ def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(at):
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "on servos"])
 @pytest.mark.parametrize("method", FIXED)
-def test_a_step_is_the_amplification_of_the_methods_own_step(robots, at, name, method):
+def test_growth_is_that_of_the_amplification_of_the_methods_own_step(robots, at, name, method):
     if METHODS[method].solves_stages and at.tree.coordinates.balls:
         at = held(robots["pendulum"], "qpos0")
     dt = {"gripper": 0.05}.get(name, 0.02)
     exact = amplification(METHODS[method], at.tree, at.q, np.zeros(at.nv), at.tau, dt)
-    assert np.abs(at.step(method, dt) - exact).max() < 1e-11 * np.abs(exact).max()
     growth = np.abs(np.linalg.eigvals(exact)).max()
     assert at.growth(method, dt) == pytest.approx(growth, abs=1e-6)
 

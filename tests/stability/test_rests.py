@@ -8,8 +8,8 @@ from compare.engines.mujoco.forces import rows_at
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.step import Step
-from compare.stability.naming import limiting
-from compare.stability.place import in_the_air_at, standing_at
+from compare.stability.answer import Asked, limit_row, limiting
+from compare.stability.place import Posture, in_the_air_at, standing_at
 from compare.stability.rest import NEAR_REST
 
 SPEEDING = '<general joint="turn" biastype="affine" biasprm="0 0 1"/>'  # force = speed
@@ -36,52 +36,42 @@ def test_the_rest_depends_on_the_step_where_contacts_are_softened():
     place = place_of(LEG)
     fine, coarse = (rest_of(LEG, dt).state for dt in (1e-3, 0.03))
     deeper = np.abs(fine - coarse).max()
-    assert 1e-5 < deeper < 0.1 and place.surroundings == "contact" and place.touching == 1
+    assert 1e-5 < deeper < 0.1 and place.surroundings == "contact" and place.is_touching
 
 
 def test_a_saddle_is_left_where_it_leads_to_a_rest():
     hanging = place_of(POLE.format(""))
     assert abs(abs(hanging.moved[0]) - np.pi) < 0.1 and limit_of(POLE.format("")).kind == "none"
     stopped = place_of(POLE.format('range="-20 30" limited="true"'))
-    assert (
-        abs(stopped.moved[0]) > 0.3
-        and limit_of(POLE.format('range="-20 30" limited="true"')).kind != "saddle"
-    )
+    assert abs(stopped.moved[0]) > 0.3
+    assert limit_of(POLE.format('range="-20 30" limited="true"')).kind != "saddle"
 
 
 @pytest.mark.parametrize("actuator, rate", [(SPEEDING, 1.0 / INERTIA), (PUSHING, np.sqrt(20.0 / INERTIA))])
 def test_a_saddle_that_leads_nowhere_is_told_with_its_rate(actuator, rate):
     for integrator in ("Euler", "implicitfast", "RK4"):
         found = limit_of(hinge(actuator=actuator), integrator)
-        assert (found.kind, found.dt) == ("saddle", None) and found.growth.rate == pytest.approx(
-            rate, rel=0.02
-        )
+        assert (found.kind, found.dt) == ("saddle", None)
+        assert found.growth.rate == pytest.approx(rate, rel=0.02)
 
 
 def test_what_falls_has_no_rest_and_one_in_the_air_has():
     falling, lying = place_of(STONE.format("")), place_of(STONE.format(FLOOR))
-    assert falling.left == pytest.approx(9.81) and falling.surroundings == "free" and falling.touching == 0
+    assert falling.left == pytest.approx(9.81) and falling.surroundings == "free" and not falling.is_touching
     assert limit_of(STONE.format("")).kind == "no rest"
-    assert in_the_air_at(falling, "").left < NEAR_REST
-    assert lying.touching == 1 and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
+    assert in_the_air_at(falling).left < NEAR_REST
+    assert lying.is_touching and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
     assert limit_of(STONE.format(FLOOR)).kind == "none"
-    assert in_the_air_at(place_of(hinge()), "") is None  # nothing touches it, and it rests
+    assert in_the_air_at(place_of(hinge())) is None  # nothing touches it, and it rests
 
 
 def test_in_the_air_a_free_base_has_no_weight_and_a_fixed_one_has():
     for text, weightless in ((BOX, True), (CASTER, True), (LEG, False)):
-        air = in_the_air_at(place_of(text), "")
-        assert (air.surroundings, air.touching) == ("air", 0)
+        air = in_the_air_at(place_of(text))
+        assert (air.surroundings, air.is_touching) == ("air", False)
         assert (not air.model.opt.gravity.any()) is weightless
     assert place_of(LEG).model.opt.gravity.any()
-    assert rest_of(BOX).is_held.tolist() == [
-        False,
-        False,
-        True,
-        True,
-        True,
-        False,
-    ]  # slides and turns on its floor
+    assert np.flatnonzero(rest_of(BOX).is_held).tolist() == [2, 3, 4]  # it slides and turns on its floor
 
 
 def test_what_limits_is_named_with_its_contact():
@@ -117,6 +107,25 @@ def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():
 
 def test_a_posture_may_be_numbers():
     reading = read(KINDS["servos"])
-    place = standing_at(reading, "mine", "", np.array([0.2, -0.1]))
+    place = standing_at(reading, Posture("mine", "", (0.2, -0.1)))
     data = place.start[1:3]
     assert data == pytest.approx([0.2, -0.1]) and np.abs(place.moved).max() < 0.2
+
+
+def test_what_bounces_is_not_in_the_air():
+    """A light box on a stiff floor never rests at 2 ms: its floor stays, and the step is not stable."""
+    box = BOX.replace('mass="2"', 'mass="1e-6"').replace(
+        "<worldbody>", '<default><geom solref="-1e5 -100"/></default><worldbody>'
+    )
+    place = place_of(box)
+    assert place.surroundings == "contact"
+    row = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))
+    assert row.limit == "moving" and row.stable_at_file_dt is False and 1e-4 < row.own_dt < 2e-3
+
+
+def test_a_loose_object_that_moves_on_is_named_and_hides_nothing():
+    ball = '<body name="ball" pos="0 0 5"><freejoint/><geom size="0.1"/></body></worldbody>'
+    text = hinge(20.0, 5.0).replace("</worldbody>", ball)
+    place = place_of(text)
+    assert place.held_objects == "ball" and not place_of(hinge()).held_objects
+    assert limit_of(text).dt == pytest.approx(limit_of(hinge(20.0, 5.0)).dt, rel=3e-3)

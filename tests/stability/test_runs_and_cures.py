@@ -16,8 +16,7 @@ from compare.engines.mujoco.variants import (
 )
 from compare.stability import cures
 from compare.stability.control import controlled
-from compare.stability.deviations import grows, has_grown
-from compare.stability.growth import growth
+from compare.stability.growth import grows, growth, has_grown
 from compare.stability.limits import tried
 from compare.stability.motion import motion
 from compare.stability.rest import rest_near
@@ -49,9 +48,8 @@ def test_growth_in_a_run_is_that_of_the_step():
     place = place_of(hinge(20.0, 5.0))
     for dt in (0.021, 0.03):
         factor = tried(place.model, place.rest, dt, "Euler").growth.factor
-        assert factor > 1.05 and growth_in_run(place.model, place.rest, dt, "Euler") == pytest.approx(
-            factor, rel=1e-3
-        )
+        assert factor > 1.05
+        assert growth_in_run(place.model, place.rest, dt, "Euler") == pytest.approx(factor, rel=1e-3)
     assert growth_in_run(place.model, place.rest, 0.001, "Euler") < 1.0
 
 
@@ -93,10 +91,10 @@ def test_the_files_own_run_stays_still_up_to_a_step():
     place, swinging = place_of(hinge(20.0, 5.0)), place_of(hinge(20.0, 0.0))
     start = Step(place.model, 1e-3, "Euler").moved(place.rest, np.array([1e-2, 0.0]))
     assert [stays_still(place.model, start, dt, "Euler", 0.0) for dt in (2e-3, 0.03)] == [True, False]
-    still = [stays_still(swinging.model, start, 2e-3, "Euler", creep) for creep in (0.01, 0.022)]
+    still = [stays_still(swinging.model, start, 2e-3, "Euler", creep) for creep in (0.04, 0.06)]
     assert still == [False, True]
     exact = (-5.0 + np.sqrt(25.0 + 4.0 * INERTIA * 20.0)) / 20.0
-    assert 0.93 * exact < own_limit(place.model, start, "Euler", 0.05, 0.0) < exact
+    assert 0.97 * exact < own_limit(place.model, start, "Euler", 0.05, 0.0) < exact
     assert own_limit(place.model, start, "Euler", 0.01, 0.0) == 0.01
 
 
@@ -131,19 +129,13 @@ def test_a_program_grows_as_the_exact_map_of_one_hinge():
 
 @pytest.mark.parametrize("delay", [0, 4, 11])
 def test_runs_show_the_longest_period_and_the_longest_delay_of_two_servos(delay):
-    found = program(
-        two(HOLDING.replace('kv="3"', 'kv="0.7"').replace('kv="2"', 'kv="0.4"')),
-        dt=5e-4,
-        integrator="implicitfast",
-    )
+    weak = two(HOLDING.replace('kv="3"', 'kv="0.7"').replace('kv="2"', 'kv="0.4"'))
+    found = program(weak, dt=5e-4, integrator="implicitfast")
     longest = found.longest_period(delay)
     assert not found.grows_in_run(longest, delay) and found.grows_in_run(longest + 2, delay)
     latest = found.longest_delay(longest - 3, delay)
-    assert (
-        latest >= delay
-        and not found.grows_in_run(longest - 3, latest)
-        and found.grows_in_run(longest - 3, latest + 2)
-    )
+    grown = [found.grows_in_run(longest - 3, late) for late in (latest, latest + 2)]
+    assert latest >= delay and grown == [False, True]
 
 
 def test_a_program_that_is_late_may_be_stable_where_one_in_time_is_not():
@@ -174,8 +166,8 @@ def test_a_body_that_spins_about_its_middle_axis_leaves_by_itself():
     rates = []
     for omega in (0.0, 20.0):
         place = place_of(SPIN.format(omega))
-        found = motion(place.model, place.start, 0.01, "RK4")
-        assert found.is_stable and found.failed_at is None
+        found = motion(place, 0.01, "RK4")
+        assert found.passed and found.failed_at is None
         assert found.rate == pytest.approx(found.exact_rate, rel=0.05)
         rates.append(found.exact_rate)
     assert rates[1] - rates[0] == pytest.approx(20.0 / np.sqrt(3.0), rel=0.1)
@@ -187,8 +179,8 @@ def test_a_body_that_spins_about_its_middle_axis_leaves_by_itself():
 ])  # fmt: skip
 def test_a_swing_grows_by_its_step_alone_where_the_exact_motion_does_not(joint, dt, integrator, stable):
     place = place_of(SWING.format(joint))
-    found = motion(place.model, place.start, dt, integrator)
-    assert found.is_stable is stable and (found.failed_at is None) is stable
+    found = motion(place, dt, integrator)
+    assert found.passed is stable and (found.failed_at is None) is stable
 
 
 # cures
@@ -205,11 +197,11 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula():
     assert found.keys() == {"less_kv", "more_armature"}
     assert 0.999 * less < found["less_kv"] < cures.WITHIN * less
     assert 0.999 * more < found["more_armature"] < cures.WITHIN * more
-    for changed in (
+    weaker, heavier = (
         with_kv(place.model, 1.0 / found["less_kv"]),
         with_armature(place.model, found["more_armature"]),
-    ):
-        assert not grows(rest_near(Step(changed, dt, "Euler"), place.rest))
+    )
+    assert not any(grows(rest_near(Step(changed, dt, "Euler"), place.rest)) for changed in (weaker, heavier))
 
 
 def test_what_helps_a_standing_leg_holds_in_a_run_and_half_of_it_does_not():
@@ -230,10 +222,8 @@ def test_each_change_changes_what_it_says():
     place = place_of(FOOT)
     model = place.model
     assert with_kv(model, 0.5).actuator_biasprm[:, 2].tolist() == [-25.0, -3.0, -3.0]
-    assert (
-        with_impratio(model, 4.0).opt.impratio == 12.0
-        and with_other_cone(model, 1.0).opt.cone != model.opt.cone
-    )
+    assert with_impratio(model, 4.0).opt.impratio == 12.0
+    assert with_other_cone(model, 1.0).opt.cone != model.opt.cone
     assert with_slower_contacts(model, 3.0).geom_solref[:, 0] == pytest.approx(0.06)
     assert with_kv(place_of(KINDS["a box"]).model, 0.5) is None
     assert not with_armature(place_of(KINDS["a box"]).model, 9.0).dof_armature.any()  # of a free joint

@@ -65,8 +65,9 @@ def test_derivatives_are_those_of_31_digits_entry_by_entry(name, rng):
     qdd, by = tmt.acceleration(q, qd, tau, tree), tmt.derivatives(q, qd, tau, tree)
     entries = Entries(tree, q, qd)
     scales = {
-        "derivatives": entries.derivatives(tau, qdd, by), "inverse_dynamics_derivatives": entries.force_rates(tau)
-    }  # fmt: skip
+        "derivatives": entries.derivatives(tau, qdd, by),
+        "inverse_dynamics_derivatives": entries.force_rates(tau),
+    }
     for quantity, scale in scales.items():
         truth = exact_of_many(tree, quantity, q, qd, tau)
         compiled = Evaluator(tree, quantity).of_any(q, qd, tau)

@@ -81,7 +81,7 @@ def put_directions(state: Value, at: int, n: int, first: Value, width: int) -> N
 
 
 def rows_of(first: Value, count: Value, width: int) -> list[Value]:
-    """The rows from the first on that are taken side by side; for those beyond the count the last one stands."""
+    """The rows from the first on, side by side; for those beyond the count the last one stands."""
     rows = [first + lane for lane in range(width)]
     return [row.compare("lt", count).choose(row, count - 1) for row in rows]
 

@@ -1,8 +1,9 @@
 """Straight-line code from a tape: one function, or a row of functions where the tape is long, for one state or several.
 
-A traced function has the signature void name(ptr in, ptr out): numbers in a row, of several states side by side each number of
-all of them together. A product that goes into one sum alone is rounded with it, once. LLVM takes more than twice as long for
-twice as many lines in one function, so long tapes are cut; what one part hands to a later one stands in an array.
+A traced function has the signature void name(ptr in, ptr out): numbers in a row, of several states side by
+side each number of all of them together. A product that goes into one sum alone is rounded with it, once.
+LLVM takes more than twice as long for twice as many lines in one function, so long tapes are cut; what one
+part hands to a later one stands in an array.
 """
 
 import math
@@ -85,7 +86,7 @@ def entry(name: str, attributes: str, *more: str) -> Code:
 
 
 def places_handed_on(made: list[list[Key]], last: Mapping[Key, int]) -> tuple[dict[Key, int], int]:
-    """The place of each value that a part hands to a later one, used again after its last part; how many places there are."""
+    """The place of each value that a part hands to later ones, free after the last; how many places."""
     leaving: list[list[int]] = [[] for _ in made]
     free: list[int] = []
     places: dict[Key, int] = {}
@@ -211,11 +212,12 @@ def called(code: Code, name: str, values: list[Value], count: int, width: int) -
 
 
 def sincos(x: Value) -> tuple[Value, Value]:
-    """(sin x, cos x) for |x| <= LIMIT, x in rad, else NaN, without a branch, so that many can be computed side by side.
+    """(sin x, cos x) for |x| <= LIMIT, x in rad, else NaN; without a branch, for many side by side.
 
-    x is reduced to r = x - n pi/2 in [-pi/4, pi/4] by two fused multiply-adds (pi/2 as the sum of two doubles: the first
-    difference is rounded once, however large n is), then the minimax polynomials of fdlibm (Sun, 1993), then n modulo 4 swaps
-    the two and sets their signs by bits. Off by at most 2.2e-16. Beyond, neighbouring doubles are an eighth of a radian apart.
+    x is reduced to r = x - n pi/2 in [-pi/4, pi/4] by two fused multiply-adds (pi/2 as the sum of two
+    doubles: the first difference is rounded once, however large n is), then the minimax polynomials of fdlibm
+    (Sun, 1993), then n modulo 4 swaps the two and sets their signs by bits. Off by at most 2.2e-16. Beyond,
+    neighbouring doubles are an eighth of a radian apart.
     """
     bits = wide(INDEX, width_of(x.kind))
     unit = x.function("fabs").compare("le", LIMIT).choose(x.like(1.0), math.nan)

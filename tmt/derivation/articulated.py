@@ -44,7 +44,7 @@ class Symmetric(NamedTuple):
 
 
 class Screw(NamedTuple):
-    """A motion: angular velocity, or its rate, and velocity of the point at O; or moment and force about O."""
+    """Angular velocity (or its rate) and velocity of the point at O; or moment and force about O."""
 
     turn: Vector
     shift: Vector

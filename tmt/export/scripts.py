@@ -1,4 +1,4 @@
-"""Functions in Python (NumPy alone, any batch of states), for CasADi, and in one file for MATLAB and Octave."""
+"""Functions in Python with NumPy alone, for CasADi, and in one file for MATLAB and Octave."""
 
 from collections.abc import Iterable, Sequence
 
@@ -26,8 +26,14 @@ def arrays(sizes, *states):
             raise ValueError(f"shape {{x.shape}}; expected (..., {{size}})")
     return *states, np.broadcast_shapes(*(x.shape[:-1] for x in states))
 '''
-NOTE = "Each is a casadi.Function of columns; of a result of three dimensions the matrices are one below the other."
-COLUMNS = "States are columns: q (nq, N), qd and tau (nv, N). The last dimension of each result is that of the states."
+NOTE = (
+    "Each is a casadi.Function of columns; "
+    "of a result of three dimensions the matrices are one below the other."
+)
+COLUMNS = (
+    "States are columns: q (nq, N), qd and tau (nv, N). "
+    "The last dimension of each result is that of the states."
+)
 
 
 def docstring(lines: Sequence[str]) -> str:

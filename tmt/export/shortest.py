@@ -54,7 +54,7 @@ class Forms:
         return self.known[poly]
 
     def candidates(self, poly: Polynomial) -> Iterator[Expression]:
-        """Forms of a polynomial in sines and cosines: with their squares reduced in each way, as a product, as waves."""
+        """A polynomial with its squares reduced in each way, as a product, and as waves."""
         few = len(poly) <= FEW_TERMS
         squared = [
             pair for pair in self.ring.places if few and any(monomial[pair[1]] > 1 for monomial in poly)

@@ -111,7 +111,7 @@ METHODS: dict[str, Method] = {
 
 
 def method_named(name: str) -> Method:
-    """The method of that name in METHODS, as it is there now; ValueError if there is none, or it is no Method with a step."""
+    """The method of that name in METHODS, as it is there now; ValueError if there is none with a step."""
     if not isinstance(name, str) or name not in METHODS:
         names = ", ".join(METHODS)
         raise ValueError(f"unknown method {shown(name)}; known are {names}, and for simulate taylor")

@@ -25,7 +25,7 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 
 class Differentiated(Dynamics):
-    """Accelerations at many states (numbers, or dual numbers of arrays), with the derivatives of the linear system."""
+    """Accelerations at many states, of dual numbers by the derivatives of the linear system."""
 
     def __init__(self) -> None:
         super().__init__(composite.mass_matrix_and_bias)

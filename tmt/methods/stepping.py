@@ -1,7 +1,8 @@
-"""What a method of integration is, `Method`, and the accelerations by which it steps, which its `slope` asks `Dynamics` for.
+"""What a method of integration is, `Method`, and the `Dynamics` that its `slope` asks for accelerations.
 
-Another way to have accelerations is a subclass of Dynamics: with calls in compiled code (forms.py), with derivatives by those of
-the linear system (derivatives.py). What a method is able to do is said by its fields; nothing asks for its type.
+Another way to have accelerations is a subclass of Dynamics: with calls in compiled code (forms.py), with
+derivatives by those of the linear system (derivatives.py). What a method is able to do is said by its fields;
+nothing asks for its type.
 """
 
 from collections.abc import Callable, Sequence
@@ -21,7 +22,7 @@ DIVERGED, NEWTON, SMALL = 1, 2, 3  # why a run ends; 0: it does not
 
 
 class Implicit(NamedTuple):
-    """What a method takes at the end of its step: (Mbar + matrix [+ dt dh/dqd, in some rows]) a = Qbar - pull."""
+    """What a method takes at the end of its step: (Mbar + matrix [+ dt dh/dqd in rows]) a = Qbar - pull."""
 
     matrix: Rows  # (nv, nv)
     pull: Values  # (nv,), N m
@@ -47,7 +48,7 @@ class Dynamics:
     def acceleration(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held = None
     ) -> Values:
-        """a (nv,) from Mbar a = Qbar, or from the linear system of a method that takes something implicitly."""
+        """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
         M, h = self.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
         if implicit is None:
@@ -72,10 +73,10 @@ LITERAL = Dynamics()
 class Method:
     """A method of integration. Another one is a subclass with a `step`; it must be hashable, as a frozen dataclass is.
 
-    `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it asks
-    `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's own `slope`.
-    For a tree with balls it is given their coordinates too (coordinates.py), `step(slope, q, qd, dt, joints)`: q is
-    longer than qd.
+    `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it
+    asks `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's
+    own `slope`. For a tree with balls it is given their coordinates too (coordinates.py), `step(slope, q, qd,
+    dt, joints)`: q is longer than qd.
     """
 
     order: int = 1  # the error of a run falls with dt to this power

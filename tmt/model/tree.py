@@ -75,7 +75,7 @@ class Tree(Mechanism[float]):
     joint_names : (n,) of all joints
     parent : (n,) index of the joint before this one, always a smaller one; -1: fixed to the world
     offset : (n, 3), m, from the origin of the parent's frame to this joint, in the parent's frame
-    axis : (nv, 3) direction of each speed, scaled to length 1; a ball has three at right angles, which turn with it
+    axis : (nv, 3) directions of the speeds, scaled to length 1; of a ball three at right angles, turning with it
     damping : (nv,), N m s/rad or N s/m, force -damping * qd
     body_names : (m,)
     body_joint : (m,) index of the last joint that moves the body; -1: fixed to the world
@@ -161,12 +161,12 @@ class Tree(Mechanism[float]):
         return singular.never(self)
 
     def lock(self, angles: Mapping[str, ArrayLike]) -> Tree:
-        """The tree of the other joints, and all bodies, where those that are named in `angles` stay there, at rest.
+        """The tree of the other joints and all bodies; those named in `angles` stay there, at rest.
 
         What hangs on a locked joint is carried by the joint before it, its vectors turned so that all frames
         are again parallel to the inertial frame where the free joints are at their reference. A joint locked
-        there rounds nothing. ValueError for an unknown joint, a position that is none, if no joint is left, or if
-        a controller takes the position of a locked joint for the torque at a free one.
+        there rounds nothing. ValueError for an unknown joint, a position that is none, if no joint is left,
+        or if a controller takes the position of a locked joint for the torque at a free one.
 
         Parameters
         ----------

@@ -2,7 +2,7 @@
 
 from .. import EngineRecord
 from .engine import Mujoco
-from .reading import Reading, engine, has_hinges, load, parse, read, tree_with_sites
+from .reading import Reading, engine, has_hinges, parse, read, tree_with_sites
 from .source import ModelError, Source
 
 ENGINE = EngineRecord(
@@ -15,7 +15,6 @@ __all__ = [
     "Source",
     "engine",
     "has_hinges",
-    "load",
     "parse",
     "read",
     "tree_with_sites",

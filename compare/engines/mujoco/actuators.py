@@ -15,6 +15,7 @@ GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
 BIASES = {"NONE": 0, "AFFINE": 3}
 DYNAMICS = {"NONE": "none", "INTEGRATOR": "integrator", "FILTER": "filter", "FILTEREXACT": "filterexact"}
 NAMED_LAWS = {"DCMOTOR": "a DC motor", "USER": "a user-defined law"}
+BEYOND_LAW = {"delay": "a delay", "damping": "damping of its own", "dampingpoly": "damping of its own"}
 GROUPS = 31  # that can be switched off
 
 
@@ -30,7 +31,6 @@ def drive_of(source: Source, keys: Mapping[int, str]) -> Drive:
 def actuator(m: mujoco.MjModel, i: int) -> Actuator:
     """One actuator; its law is that of the compiled model."""
     gain, bias = kind(mujoco.mjtGain, m.actuator_gaintype[i]), kind(mujoco.mjtBias, m.actuator_biastype[i])
-    dynamics = kind(mujoco.mjtDyn, m.actuator_dyntype[i])
     place, inputs = control_of(m, i)
     joint, moment = moment_of(m, i)
     clamped = inputs and on(m, "CLAMPCTRL") and m.actuator_ctrllimited[place]
@@ -40,30 +40,41 @@ def actuator(m: mujoco.MjModel, i: int) -> Actuator:
         moment=moment,
         gain=law(m.actuator_gainprm[i], GAINS.get(gain, 0)),
         bias=law(m.actuator_biasprm[i], BIASES.get(bias, 0)),
-        dynamics=DYNAMICS.get(dynamics, "none"),
+        dynamics=DYNAMICS.get(kind(mujoco.mjtDyn, m.actuator_dyntype[i]), "none"),
         control_range=tuple(m.actuator_ctrlrange[place].tolist()) if clamped else None,
         activation_range=tuple(m.actuator_actrange[i].tolist()) if m.actuator_actlimited[i] else None,
         off=off(m, i),
-        refused=refused(m, i, gain, bias, dynamics, inputs),
+        refused=refused(m, i),
     )
 
 
-def refused(m: mujoco.MjModel, i: int, gain: str, bias: str, dynamics: str, inputs: int) -> str:
+def is_affine(m: mujoco.MjModel, i: int) -> bool:
+    """Whether the law of an actuator is one that is known here."""
+    gain, bias = kind(mujoco.mjtGain, m.actuator_gaintype[i]), kind(mujoco.mjtBias, m.actuator_biastype[i])
+    return gain in GAINS and bias in BIASES
+
+
+def refused(m: mujoco.MjModel, i: int) -> str:
     """Why the law of an actuator cannot be evaluated here; "" if it can."""
     if m.actuator_plugin[i] >= 0:
         return "a plugin"
-    for word, known in ((dynamics, DYNAMICS), (gain, GAINS), (bias, BIASES)):
+    kinds = (
+        (kind(mujoco.mjtDyn, m.actuator_dyntype[i]), DYNAMICS),
+        (kind(mujoco.mjtGain, m.actuator_gaintype[i]), GAINS),
+        (kind(mujoco.mjtBias, m.actuator_biastype[i]), BIASES),
+    )
+    for word, known in kinds:
         if word not in known:
             return NAMED_LAWS.get(word, f"a law of type {word.lower()}")
-    if inputs != 1:
+    if (inputs := control_of(m, i)[1]) != 1:
         return f"{inputs} controls"
-    if np.any(getattr(m, "actuator_delay", np.zeros(i + 1))[i]):
-        return "a delay"
     transmission = kind(mujoco.mjtTrn, m.actuator_trntype[i])
     if transmission not in WITH_LENGTH:
         return f"a transmission of type {transmission.lower()}"
-    damping = [getattr(m, f"actuator_{name}", np.zeros(i + 1))[i] for name in ("damping", "dampingpoly")]
-    return "damping of its own" if any(map(np.any, damping)) else ""
+    for field, why in BEYOND_LAW.items():
+        if np.any(getattr(m, f"actuator_{field}", np.zeros(i + 1))[i]):
+            return why
+    return ""
 
 
 def off(m: mujoco.MjModel, i: int) -> str:
@@ -77,7 +88,7 @@ def off(m: mujoco.MjModel, i: int) -> str:
 
 
 def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple[float, ...] | None]:
-    """The first joint on which an actuator acts, or ""; and dl/dq where it is the same everywhere, else None."""
+    """The first joint on which an actuator acts, or ""; dl/dq where it is the same everywhere, else None."""
     transmission, target = mujoco.mjtTrn(m.actuator_trntype[i]), int(m.actuator_trnid[i, 0])
     joint, moment = "", None
     if transmission in OF_A_JOINT:
@@ -105,8 +116,8 @@ def tendon_moment(m: mujoco.MjModel, i: int) -> np.ndarray | None:
 def stated_controls(source: Source) -> dict[int, tuple[float | None, ...]]:
     """By the number of a keyframe u of each actuator, None where it states none.
 
-    u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has zeros where a file
-    states none: the file tells. Of a model compiled elsewhere all zeros are none.
+    u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has zeros
+    where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
     m, spec = source.model, source.spec
     keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None

@@ -1,6 +1,6 @@
 """A file with other inertial numbers and another gravity, and with a payload."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import mujoco
 import numpy as np
@@ -19,14 +19,9 @@ Values = Mapping[str, Array]  # of arguments by name
 
 def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) -> mujoco.MjModel:
     assert source.spec is not None
-    spec, model = without_visuals(source.spec.copy()), source.model
-    for body, number in zip(spec.bodies[1:], source.bodies[1:]):  # as they were compiled
-        state_inertial(body, model.body_mass[number], model.body_ipos[number])
-        body.iquat, body.inertia = model.body_iquat[number], model.body_inertia[number]
-        body.fullinertia = np.full(6, np.nan)
+    spec, model = without_visuals(source.spec), source.model
+    state_as_compiled(spec, model, source.bodies)
     bodies = {element_name(model, "body", number): body for body, number in zip(spec.bodies, source.bodies)}
-    spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
-    spec.compiler.settotalmass = -1.0
     if parameters.has_payload:
         carrier = bodies[tree.body_names[parameters.carriers[-1]]]
         load = carrier.add_body(name=PAYLOAD)
@@ -47,6 +42,16 @@ def changed(source: Source, tree: Tree, parameters: Parameters, values: Values) 
     if "gravity" in values:
         spec.option.gravity = values["gravity"]
     return compiled(spec)
+
+
+def state_as_compiled(spec: mujoco.MjSpec, model: mujoco.MjModel, numbers: Sequence[int]) -> None:
+    """State the inertias of all bodies, whose numbers in the model are given, as they were compiled."""
+    for body, number in zip(spec.bodies[1:], numbers[1:]):
+        state_inertial(body, model.body_mass[number], model.body_ipos[number])
+        body.iquat, body.inertia = model.body_iquat[number], model.body_inertia[number]
+        body.fullinertia = np.full(6, np.nan)
+    spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
+    spec.compiler.settotalmass = -1.0
 
 
 def state_inertial(body: mujoco.MjsBody, mass: float, com: Array) -> None:

@@ -1,17 +1,16 @@
-"""Derivatives in MuJoCo, all of them finite differences: mjd_transitionFD, mjd_inverseFD, and differences of its own steps."""
+"""Derivatives in MuJoCo by finite differences: mjd_transitionFD, mjd_inverseFD, and differences of its own steps."""
 
 from collections.abc import Callable
+from typing import Any
 
 import mujoco
 import numpy as np
 
-from .dynamics import MujocoDynamics
-from .names import element_name
-from .step import Step
+from .dynamics import Array, MujocoDynamics
+from .names import bit
 
-Array = np.ndarray
-
-Call = Callable[[], Array]
+NUDGE = 1e-6  # of central differences, rad and rad/s
+Call = Callable[[], np.ndarray]
 
 
 def of_transition(
@@ -25,7 +24,7 @@ def of_transition(
     A = np.zeros((2 * model.nv + model.na,) * 2)
     places = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])
 
-    def call() -> Array:
+    def call() -> np.ndarray:
         mujoco.mjd_transitionFD(model, data, eps, centred, A, None, None, None)
         return A[np.ix_(places, places)]
 
@@ -33,13 +32,13 @@ def of_transition(
 
 
 def of_inverse(dynamics: MujocoDynamics, q: Array, v: Array, a: Array, eps: float) -> Call:
-    """A call of mjd_inverseFD, one-sided: dtau/dq and dtau/dv side by side, (nv, 2 nv), actuators taken off; a: (nv,)."""
+    """A call of mjd_inverseFD, one-sided: dtau/dq and dtau/dv side by side, (nv, 2 nv); a: (nv,)."""
     model, data = dynamics.own_copy(1.0, "Euler", q, v)
     data.qacc[dynamics.dofs] = a
     by = np.zeros((2, model.nv, model.nv))
     places = np.ix_(dynamics.dofs, dynamics.dofs)
 
-    def call() -> Array:
+    def call() -> np.ndarray:
         mujoco.mjd_inverseFD(model, data, eps, True, *by, None, None, None, None, None)
         return np.hstack([matrix.T[places] for matrix in by])  # MuJoCo's are transposed
 
@@ -52,28 +51,36 @@ def of_steps(
     """A call of mj_step from states nearby: [A B] (2 nv, 3 nv) of a step of any integrator, B by torque."""
     n, coordinates = len(dynamics.dofs), dynamics.coordinates
 
-    def ends(size: float) -> tuple[Array, Array]:
+    def ends(size: float) -> tuple[np.ndarray, np.ndarray]:
         """The state after the step from each nudged state."""
         nudges = size * np.eye(3 * n)
-        start = coordinates.move(q, nudges[:, :n])
+        start = coordinates.move(np.asarray(q), nudges[:, :n])
         motion = dynamics.run(start, v + nudges[:, n : 2 * n], tau + nudges[:, 2 * n :], dt, 1, integrator)
         return motion.q[:, 1], motion.v[:, 1]
 
-    def call() -> Array:
+    def call() -> np.ndarray:
         (q1, v1), (q0, v0) = ends(eps), ends(-eps if centred else 0.0)
-        return np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1).T / ((1 + centred) * eps)
+        moved = np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1)
+        return moved.T / ((1 + centred) * eps)
 
     return call
 
 
-def touching(step: Step, state: Array, by: Array) -> set[str]:
-    """The pairs of geoms whose contacts have forces at a state that is moved by a deviation, and how many contacts each has."""
-    step.put(state, by)
-    model, data = step.model, step.data
-    mujoco.mj_forward(model, data)
-    pairs: dict[str, int] = {}
-    for contact in data.contact:
-        if contact.efc_address >= 0:
-            name = " and ".join(element_name(model, "geom", geom) for geom in contact.geom)
-            pairs[name] = pairs.get(name, 0) + 1
-    return {f"{name} ({count})" for name, count in pairs.items()}
+def transition(dynamics: MujocoDynamics, q: Array, tau: Array, dt: float, integrator: str) -> np.ndarray:
+    """d(movement, speed)+/d(movement, speed) of one step at rest, (2nv, 2nv); q: (nq,) rad, m; tau: (nv,) N m."""
+    n = len(dynamics.dofs)
+    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, NUDGE, centred=True)()[:, : 2 * n]
+
+
+def left_to_itself(
+    dynamics: MujocoDynamics, q: Array, qd: Array, tau: Array, dt: float, steps: int, integrator: str
+) -> dict[str, Any]:
+    """A run with MuJoCo's automatic reset: its clock's time (steps + 1,) s, q, qd; how many warnings there were."""
+    model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
+    model.opt.disableflags &= ~bit("AUTORESET")
+    path = [(0.0, q, qd)]
+    for _ in range(steps):
+        mujoco.mj_step(model, data)
+        path.append((data.time, data.qpos[dynamics.qpos], data.qvel[dynamics.dofs]))
+    time, positions, speeds = map(np.array, zip(*path))
+    return {"time": time, "q": positions, "qd": speeds, "warnings": int(data.warning.number.sum())}

@@ -23,6 +23,7 @@ from .names import (
     OF_A_JOINT,
     bit,
     element_name,
+    geom_name,
     joint_name,
     joint_places,
     moving,
@@ -49,11 +50,11 @@ class Engaged(NamedTuple):
 
 
 class MujocoDynamics:
-    """MuJoCo with one model; quantities at any states q (..., nq), v and tau (..., nv), joints in the order of the coordinates.
+    """MuJoCo with one model; quantities at any states q (..., nq), v and tau (..., nv), joints in the case's order.
 
-    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position zero.
-    bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move. engaged: its
-    actuators; of a given torque only the part beyond their constant part is applied.
+    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position
+    zero. bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move.
+    engaged: its actuators; of a given torque only the part beyond their constant part is applied.
     """
 
     def __init__(
@@ -89,11 +90,16 @@ class MujocoDynamics:
         def both(d: mujoco.MjData) -> np.ndarray:
             return self._of_bodies(lambda T, B, body: mujoco.mj_jacBodyCom(self.model, d, T, B, body))
 
-        pairs = self._each(both, q)
-        return pairs[..., 0, :, :, :], pairs[..., 1, :, :, :]
+        T, B = np.moveaxis(self._each(both, q), -4, 0)
+        return T, B
 
     def convective_terms(self, q: Array, v: Array) -> Pair:
-        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel."""
+        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel; with balls accelerations.
+
+        mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body.
+        """
+        if self.coordinates.has_balls:
+            return self._convective_accelerations(q, v)
 
         def terms(d: mujoco.MjData) -> np.ndarray:
             def rates(T: np.ndarray, B: np.ndarray, body: int) -> None:
@@ -101,8 +107,27 @@ class MujocoDynamics:
 
             return self._of_bodies(rates) @ d.qvel[self.dofs]
 
-        pairs = self._each(terms, q, v)
-        return pairs[..., 0, :, :], pairs[..., 1, :, :]
+        v_conv, w_conv = np.moveaxis(self._each(terms, q, v), -3, 0)
+        return v_conv, w_conv
+
+    def _convective_accelerations(self, q: Array, v: Array) -> Pair:
+        """The accelerations of the bodies at qacc = 0 without gravity: mj_objectAcceleration."""
+        model, gravity = self.model, self.model.opt.gravity.copy()
+
+        def terms(d: mujoco.MjData) -> Pair:
+            both = np.zeros((len(self.bodies), 6))
+            d.qacc[:] = 0.0
+            mujoco.mj_rnePostConstraint(model, d)
+            for row, body in zip(both, self.bodies):
+                mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, row, 0)
+            return both[:, 3:], self._to_body(both[:, :3])
+
+        try:
+            model.opt.gravity[:] = 0.0
+            v_conv, w_conv = np.moveaxis(self._each(terms, q, v), -3, 0)
+        finally:
+            model.opt.gravity[:] = gravity
+        return v_conv, w_conv
 
     def mass_matrix(self, q: Array) -> np.ndarray:
         """M, kg m2, (..., nv, nv): mj_fullM."""
@@ -142,19 +167,20 @@ class MujocoDynamics:
 
     def acting_actuators(self, q: Array, v: Array) -> list[str]:
         """The names of the actuators that exert a force at a state, and their joints."""
-        m = self.model
+        m, names = self.model, []
         forces = self._each(lambda d: d.actuator_force, q, v).reshape(-1, number_of_actuators(m))
-        names = {i: element_name(m, "actuator", i) for i in np.flatnonzero(forces.any(axis=0)).tolist()}
-        joints = {
-            i: m.actuator_trnid[i, 0] for i in names if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT
-        }
-        return [f"{name} on {joint_name(m, joints[i])}" if i in joints else name for i, name in names.items()]
+        for i in np.flatnonzero(forces.any(axis=0)).tolist():
+            has_joint = mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT
+            joint = f" on {joint_name(m, m.actuator_trnid[i, 0])}" if has_joint else ""
+            names.append(element_name(m, "actuator", i) + joint)
+        return names
 
     def additional_bodies(self) -> list[tuple[str, float]]:
         """Bodies with mass, kg, that are not among those of the case, by name."""
-        masses = enumerate(self.model.body_mass.tolist())
-        others = {body: mass for body, mass in masses if mass and body not in self.bodies}
-        return [(element_name(self.model, "body", body), mass) for body, mass in others.items()]
+        others = np.setdiff1d(np.flatnonzero(self.model.body_mass), self.bodies)
+        return [
+            (element_name(self.model, "body", body), float(self.model.body_mass[body])) for body in others
+        ]
 
     @property
     def may_touch(self) -> bool:
@@ -164,18 +190,12 @@ class MujocoDynamics:
 
     def touching(self, q: np.ndarray) -> list[set[tuple[str, str]]]:
         """The pairs of geoms with a contact at each position, (states, nq), by name."""
-        return [self.touching_now(self.forward(state)) for state in q]
-
-    def touching_now(self, data: mujoco.MjData) -> set[tuple[str, str]]:
-        pairs = data.contact.geom[data.contact.efc_address >= 0]
-        return {(self.geom_name(one), self.geom_name(other)) for one, other in pairs.tolist()}
-
-    def geom_name(self, number: int) -> str:
-        """The name of a geom, else that of its body."""
-        name, body = self.model.geom(number).name, int(self.model.geom_bodyid[number])
-        return name or (
-            f"a geom of {element_name(self.model, 'body', body)}" if body else "a geom of the world"
-        )
+        pairs = []
+        for state in q:
+            contacts = self.forward(state).contact
+            acting = contacts.geom[contacts.efc_address >= 0].tolist()
+            pairs.append({(geom_name(self.model, a), geom_name(self.model, b)) for a, b in acting})
+        return pairs
 
     def other_forces(self, q: Array, v: Array) -> dict[str, np.ndarray]:
         """Forces that the case's equations do not have, by source, N m, (..., nv) each."""
@@ -209,12 +229,11 @@ class MujocoDynamics:
     def run(
         self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
-        """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where a run diverges."""
+        """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where it diverges."""
         batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
         starts, follow = self.runner((q, v, tau), dt, steps, method, tolerance)
         q_path, v_path, ended = self.path(starts, follow(), dt)
-        q_path = q_path.reshape(*batch, steps + 1, q_path.shape[-1])
-        v_path = v_path.reshape(*batch, steps + 1, v_path.shape[-1])
+        q_path, v_path = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in (q_path, v_path))
         evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(batch)[()]
         return Motion(dt * np.arange(steps + 1), q_path, v_path, evaluations, ended, steps)
 
@@ -243,7 +262,7 @@ class MujocoDynamics:
     def runner(
         self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance, threads: int = 1
     ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:  # fmt: skip
-        """The first states, time first, and a call that runs MuJoCo's C loop from them; it returns (runs, steps, ...)."""
+        """The first states, time first, and a call that runs MuJoCo's C loop from them to (runs, steps, ...)."""
         if tolerance is not None:
             raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
         model, data = self.own_copy(dt, method)
@@ -263,7 +282,6 @@ class MujocoDynamics:
         sensors = np.zeros((runs, steps, model.nsensordata))
         controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
         options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
-
         of_threads = [data, *(mujoco.MjData(model) for _ in range(threads - 1))]
 
         def run() -> np.ndarray:
@@ -310,26 +328,3 @@ class MujocoDynamics:
             fill(T, B, body)
         T, B = pair[..., self.dofs]
         return np.stack([T, self._to_body(B)])
-
-
-def convective_accelerations(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray) -> Pair:
-    """v_conv, world, and w_conv, body axes, (states, m, 3): accelerations of the bodies at qacc = 0 without gravity.
-
-    By mj_objectAcceleration, not mj_jacDot as MujocoDynamics.convective_terms. q (states, nq), v (states, nv).
-    """
-    model, gravity = dynamics.model, dynamics.model.opt.gravity.copy()
-
-    def terms(d: mujoco.MjData) -> Pair:
-        both = np.zeros((len(dynamics.bodies), 6))
-        d.qacc[:] = 0.0
-        mujoco.mj_rnePostConstraint(model, d)
-        for row, body in zip(both, dynamics.bodies):
-            mujoco.mj_objectAcceleration(model, d, mujoco.mjtObj.mjOBJ_BODY, body, row, 0)
-        return both[:, 3:], dynamics._to_body(both[:, :3])
-
-    try:
-        model.opt.gravity[:] = 0.0
-        v_conv, w_conv = np.moveaxis(dynamics._each(terms, q, v), -3, 0)
-    finally:
-        model.opt.gravity[:] = gravity
-    return v_conv, w_conv

@@ -15,26 +15,22 @@ from ...robots.case import Case
 from .. import Engine, Method
 from .dynamics import Engaged, MujocoDynamics
 from .inventory import set_fields, switch_off
-from .names import INTEGRATORS, bit, control_of
+from .names import INTEGRATORS, bit, set_control
 from .source import Source
 
-SCHEMES = {  # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
-    "Euler": "semi_implicit_euler",
-    "implicitfast": "semi_implicit_euler",
-    "discrete": "semi_implicit_euler",
-    "implicit": "implicit",
-    "RK4": "rk4",
-}
+# MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
+SCHEMES = dict.fromkeys(("Euler", "implicitfast", "discrete"), "semi_implicit_euler")
+SCHEMES |= {"implicit": "implicit", "RK4": "rk4"}
 FROM_4 = int(mujoco.__version__.split(".")[0]) >= 4
 
 
 def methods_for(tree: Tree | None = None) -> dict[str, Method]:
     """MuJoCo's integrators for a Tree, by name, each with the method of tmt that is the same scheme; None: only hinges.
 
-    Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own; discrete also in
-    springs. Up to 3.17 RK4 turns a ball by the mean of its speeds, and implicitfast uses a midpoint rule for a free body on its
-    own, which tmt does not have: it is left out. In the speed gain of actuators implicitfast and implicit are implicit where two
-    joints are on one path to the world; discrete everywhere, and in the position gain too; Euler in neither.
+    Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own; discrete also
+    in springs. Up to 3.17 RK4 turns a ball by the mean of its speeds, and implicitfast uses a midpoint rule for a free
+    body on its own, which tmt does not have: it is left out. In the speed gain of actuators implicitfast and implicit
+    are implicit where two joints are on one path to the world; discrete everywhere, and in the position gain too.
     """
     schemes, order = dict(SCHEMES), 4
     if tree is not None:
@@ -64,8 +60,8 @@ ACTING, IDLE = 0, 1  # groups of actuators
 class Mujoco(Engine):
     """MuJoCo with one compiled model.
 
-    bodies: their numbers in the model. tree: all that this Tree does not have is switched off, see inventory, and the methods
-    are those for it, see methods_for.
+    bodies: their numbers in the model. tree: all that this Tree does not have is switched off, see inventory, and the
+    methods are those for it.
     """
 
     name = "mujoco"
@@ -115,8 +111,8 @@ class Mujoco(Engine):
 def engaged(model: mujoco.MjModel, controller: Controller) -> Engaged:
     """Switch on the actuators of a model that take part, without any range.
 
-    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS it is
-    Euler's scheme). Activations are constant: the control of a filter equals its activation, that of an integrator is 0.
+    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS
+    it is Euler's scheme). Activations are constant, see set_control.
     """
     model.opt.disableflags &= ~bit("ACTUATION")
     set_fields(model, UNLIMITED, 0)
@@ -125,11 +121,7 @@ def engaged(model: mujoco.MjModel, controller: Controller) -> Engaged:
     ctrl, act = np.zeros(model.nu), np.zeros(model.na)
     for i, u in enumerate(controller.controls):
         model.actuator_group[i] = IDLE if u is None else ACTING
-        integrates = model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_INTEGRATOR
         if u is not None:
-            place, count = control_of(model, i)
-            ctrl[place : place + count] = 0.0 if integrates else u
-            if model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE:
-                act[model.actuator_actadr[i]] = u
+            set_control(model, i, u, ctrl, act)
     model.opt.disableactuator = 1 << IDLE
     return Engaged(ctrl, act, controller.torque)

@@ -72,36 +72,28 @@ def rows_at(step: Step, state: np.ndarray) -> tuple[np.ndarray, Rows]:
 
 
 def forces_near(step: Step, state: np.ndarray) -> Forces | None:
-    """The forces near a state at rest; None where rows begin or cease within the nudge: the edge of a contact or limit."""
-    nv, size = step.model.nv, step.size
+    """The forces near a state at rest; None where rows begin or cease within the nudge: the edge of a contact."""
 
-    def smooth() -> np.ndarray:
+    def forward(by: np.ndarray | None) -> np.ndarray:
+        """Actuators, springs and dampers; the data are those at the moved state."""
+        step.put(state, by)
+        mujoco.mj_forward(step.model, step.data)
         return step.data.qfrc_actuator + step.data.qfrc_passive
 
-    step.put(state)
-    mujoco.mj_forward(step.model, step.data)
+    forward(None)
     on = step.data.efc_state == QUADRATIC
     acting = rows(step, on)
     assert acting is not None
-    forces = Forces(
-        np.zeros((nv, size)),
-        acting,
-        np.zeros((nv, nv)),
-        np.zeros((len(acting.R), size)),
-        np.zeros((len(acting.R), size)),
-    )
-    for column, sides in enumerate(step.sides(state, NUDGE)):
-        ends, apart = [], float((sides[0] - sides[1]).sum())
-        for by in sides:
-            step.put(state, by)
-            mujoco.mj_forward(step.model, step.data)
-            ends.append((smooth(), rows(step, on)))
-        (force, ahead), (opposite, behind) = ends
+    smooth, dJf, dR, daref = [], [], [], []
+    for forth, back in step.sides(state, NUDGE):
+        apart = float((forth - back).sum())
+        force, ahead = forward(forth), rows(step, on)
+        opposite, behind = forward(back), rows(step, on)
         if ahead is None or behind is None:
             return None
-        forces.smooth[:, column] = (force - opposite) / apart
-        forces.dR[:, column] = (ahead.R - behind.R) / apart
-        forces.daref[:, column] = (ahead.aref - behind.aref) / apart
-        if column < nv:
-            forces.dJf[:, column] = (ahead.J - behind.J).T @ acting.f / apart
-    return forces
+        smooth.append((force - opposite) / apart)
+        dJf.append((ahead.J - behind.J).T @ acting.f / apart)
+        dR.append((ahead.R - behind.R) / apart)
+        daref.append((ahead.aref - behind.aref) / apart)
+    columns = [np.array(values).T for values in (smooth, dJf[: step.model.nv], dR, daref)]
+    return Forces(columns[0], acting, *columns[1:])

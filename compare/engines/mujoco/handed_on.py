@@ -32,9 +32,10 @@ def urdf(compiled: mujoco.MjModel, has_free_bodies: bool = False) -> str:
 
     Its base is fixed; has_free_bodies: with free joints, of type floating, of which readers make what they like.
 
-    Numbers have 17 significant digits; positions are those of the file (`ref` included), joints have its names. The frame of a
-    link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link without mass, and a
-    body without a joint hangs on a fixed one. URDF has no gravity, armature or springs; geoms, limits and friction are left out.
+    Numbers have 17 significant digits; positions are those of the file (`ref` included), joints have its names. The
+    frame of a link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link
+    without mass, and a body without a joint hangs on a fixed one. URDF has no gravity, armature or springs; geoms, limits
+    and friction are left out.
     """
     model = mujoco.MjModel.__copy__(compiled)
     take_away(model)  # what a flag of the file disables is zero
@@ -123,40 +124,32 @@ class Bare:
     """The compiled model of a file with all that a Tree does not have taken away or switched off.
 
     names: of the Tree's joints. rotors_in_joints: the armature of actuators is that of their joints. controller: of the
-    actuators that act, with `engaged` controls; None: none does. qpos (nq,), dofs (nv,): the indices of the Tree's coordinates
-    and speeds in MuJoCo's.
+    actuators that act, with `engaged` controls; None: none does. qpos (nq,), dofs (nv,): the indices of the Tree's
+    coordinates and speeds in MuJoCo's.
     """
 
     engaged = Engaged()
 
     def __init__(
-        self,
-        path: Path,
-        names: Sequence[str],
-        rotors_in_joints: bool = False,
-        controller: Controller | None = None,
-    ):
-        self.model = Source(path).without({}, bare=controller is None)
-        switch_off(self.model)
-        self.model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
-        # its solver starts from the unconstrained acceleration
-        self.model.opt.disableflags |= bit("WARMSTART")
-        # of constraints, which are off; both refuse PGS
-        self.model.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-        if rotors_in_joints and hasattr(self.model, "actuator_armature"):
-            self.model.dof_armature += rotors(self.model)
-            self.model.actuator_armature[:] = 0.0
-        # with this flag MuJoCo Warp's implicitfast is explicit in the damping; actuators with armature are still there
-        self.model.opt.disableflags &= ~bit("ACTUATION")
-        idle = np.ones(self.model.nu, bool)
+        self, path: Path, names: Sequence[str], rotors_in_joints: bool = False, controller: Controller | None = None
+    ):  # fmt: skip
+        m = self.model = Source(path).without({}, bare=controller is None)
+        switch_off(m)
+        # MuJoCo Warp refuses the first; with the second its implicitfast is explicit in the damping
+        m.opt.disableflags &= ~bit("AUTORESET", "ACTUATION")
+        m.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
+        m.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # of constraints, which are off; both refuse PGS
+        if rotors_in_joints and hasattr(m, "actuator_armature"):
+            m.dof_armature += rotors(m)
+            m.actuator_armature[:] = 0.0
+        idle = np.ones(m.nu, bool)  # actuators with armature are still there
         if controller:
-            self.engaged = engaged(self.model, controller)
-            self.model.opt.disableactuator = 0  # not every engine has groups
+            self.engaged = engaged(m, controller)
+            m.opt.disableactuator = 0  # not every engine has groups
             idle = np.array([control is None for control in controller.controls])
-        self.model.actuator_gainprm[idle] = self.model.actuator_biasprm[idle] = 0.0
-        # MJX refuses pairs even if there are no contacts
-        self.model.geom_contype[:] = self.model.geom_conaffinity[:] = 0
-        places = joint_places(self.model)
+        m.actuator_gainprm[idle] = m.actuator_biasprm[idle] = 0.0
+        m.geom_contype[:] = m.geom_conaffinity[:] = 0  # MJX refuses pairs even if there are no contacts
+        places = joint_places(m)
         self.places = {name: places[name] for name in names}
         self.qpos = np.array([i for place in self.places.values() for i in place.qpos])
         self.dofs = np.array([i for place in self.places.values() for i in place.dofs])

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...robots import Feature
-from .names import bit, control_of, element_name, kind_of, names_where, number_of_actuators, on
+from .names import OF_A_JOINT, bit, control_of, element_name, kind_of, names_where, number_of_actuators, on
 
 KINDS = ("hinge", "slide", "ball", "free")
 MODELLED, OFF, OPEN, LEFT_OUT = "modelled", "switched_off", "open_tree", "left_out"
@@ -34,69 +34,59 @@ REASONS = {
 }
 # enable flags that cannot change a motion without contacts
 QUIET = ("OVERRIDE", "ENERGY", "FWDINV", "DIAGEXACT")
+# fields of forces that are not linear, and the disable flag of each
+NONLINEAR = {"dof_dampingpoly": "DAMPER", "jnt_stiffnesspoly": "SPRING", "jnt_springyield": "SPRING"}
 
 
 def features(m: mujoco.MjModel) -> tuple[Feature, ...]:
-    """The features of a compiled model, always in the same order."""
-    names = names_of_features(m)
-    return tuple(Feature(name, tuple(names[name]), *REASONS[name]) for name in REASONS if names[name])
-
-
-def names_of_features(m: mujoco.MjModel) -> dict[str, list[str]]:
-    """The elements with each feature, by name."""
+    """The features of a compiled model, in the order of REASONS."""
 
     def named(kind: str, numbers: Iterable[int]) -> list[str]:
         return [element_name(m, kind, number) for number in numbers]
 
-    def having(*fields: str) -> list[str]:
-        """The elements of which one of the fields, if the installed MuJoCo has it, is not zero."""
+    def having(*fields: str, unless: str = "") -> list[str]:
+        """The elements of which a field that this MuJoCo has is not zero; none where a flag is off."""
         holds = {field: np.asarray(getattr(m, field, ())) != 0 for field in fields}
-        return [name for field in fields for name in names_where(m, field, holds[field])]
+        names = [name for field in fields for name in names_where(m, field, holds[field])]
+        return [] if unless and not on(m, unless) else names
 
-    actuators, inputs = range(number_of_actuators(m)), m.actuator_ctrllimited
-    controls = [inputs[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
-    clamped = [i for i in actuators if controls[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
-    constrained, damped, sprung = on(m, "CONSTRAINT"), on(m, "DAMPER"), on(m, "SPRING")
-    has_friction = constrained and on(m, "FRICTIONLOSS")
-    others = []
-    for name, member in mujoco.mjtEnableBit.__members__.items():
-        flag = name.removeprefix("mjENBL_")
-        if flag not in QUIET and name != flag and m.opt.enableflags & int(member):
-            others.append(f"flag {flag.lower()}")
-    if not on(m, "EULERDAMP"):
-        others.append("flag eulerdamp")
-    nonlinear = ("dof_dampingpoly",) * damped + ("jnt_stiffnesspoly", "jnt_springyield") * sprung
-    others += [f"{field} of {name}" for field in nonlinear for name in having(field)]
-    return {
-        **{kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in KINDS},
+    actuators, limited = range(number_of_actuators(m)), m.actuator_ctrllimited
+    inputs = [limited[place : place + count].any() for place, count in (control_of(m, i) for i in actuators)]
+    clamped = [i for i in actuators if inputs[i] or m.actuator_forcelimited[i] or m.actuator_actlimited[i]]
+    flags = {name.removeprefix("mjENBL_"): int(bit) for name, bit in mujoco.mjtEnableBit.__members__.items()}
+    flags = {name: bit for name, bit in flags.items() if name not in QUIET and not name.startswith("mj")}
+    others = [f"flag {name.lower()}" for name, bit in flags.items() if m.opt.enableflags & bit]
+    others += ["flag eulerdamp"] * (not on(m, "EULERDAMP"))
+    for field, flag in NONLINEAR.items():
+        others += [f"{field} of {name}" for name in having(field, unless=flag)]
+    names = {kind: named("joint", [j for j in range(m.njnt) if kind_of(m, j) == kind]) for kind in KINDS}
+    names |= {
         "armature": having("dof_armature", "actuator_armature"),
-        "damping": having("dof_damping") if damped else [],
-        "spring": having("jnt_stiffness") if sprung else [],
-        "contact": named("geom", np.unique(contact_pairs(m))) if constrained and on(m, "CONTACT") else [],
-        "limit": having("jnt_limited", "tendon_limited") if constrained and on(m, "LIMIT") else [],
-        "frictionloss": having("dof_frictionloss", "tendon_frictionloss") if has_friction else [],
+        "damping": having("dof_damping", unless="DAMPER"),
+        "spring": having("jnt_stiffness", unless="SPRING"),
+        "contact": named("geom", np.unique(contact_pairs(m))) if on(m, "CONTACT") else [],
+        "limit": having("jnt_limited", "tendon_limited", unless="LIMIT"),
+        "frictionloss": having("dof_frictionloss", "tendon_frictionloss", unless="FRICTIONLOSS"),
+        "equality": named("equality", np.flatnonzero(m.eq_active0)) if on(m, "EQUALITY") else [],
+    }
+    if not on(m, "CONSTRAINT"):
+        names |= {name: [] for name in ("contact", "limit", "frictionloss", "equality")}
+    names |= {
         "clamp": named("actuator", clamped) + having("jnt_actfrclimited", "tendon_actfrclimited"),
         "fluid": [name for name in ("density", "viscosity") if getattr(m.opt, name)],
         "gravcomp": having("body_gravcomp"),
         "actuator": named("actuator", actuators),
-        "equality": list(open_equalities(m)),
         "tendon": named("tendon", range(m.ntendon)),
         "keyframe": named("key", np.flatnonzero(usable_keys(m))),
         "unusable keyframe": named("key", np.flatnonzero(~usable_keys(m))),
         "other": others,
     }
+    return tuple(Feature(name, tuple(names[name]), *REASONS[name]) for name in REASONS if names[name])
 
 
 def usable_keys(m: mujoco.MjModel) -> np.ndarray:
     """Of each keyframe whether its numbers are finite and of at most MOST, (nkey,)."""
     return (np.abs(np.hstack([m.key_qpos, m.key_act, m.key_ctrl])) <= MOST).all(axis=1)
-
-
-def open_equalities(m: mujoco.MjModel) -> tuple[str, ...]:
-    """The names of the equalities that the file has in force; the comparison switches them off."""
-    if not (on(m, "CONSTRAINT") and on(m, "EQUALITY")):
-        return ()
-    return tuple(element_name(m, "equality", i) for i in np.flatnonzero(m.eq_active0))
 
 
 def switch_off(m: mujoco.MjModel) -> None:
@@ -178,9 +168,14 @@ def refuse(m: mujoco.MjModel) -> None:
         raise ValueError(f"flex {name!r} is elastic; only rigid bodies are compared")
     for body in np.flatnonzero(m.body_plugin >= 0):
         raise ValueError(f"a plugin acts on body {element_name(m, 'body', body)!r}; its forces are unknown")
+    only = "only that of joints is compared"
     for tendon in np.flatnonzero(m.tendon_armature):
-        why = "has armature, which couples joints; only that of joints is compared"
+        why = f"has armature, which couples joints; {only}"
         raise ValueError(f"tendon {element_name(m, 'tendon', tendon)!r} {why}")
+    for i in np.flatnonzero(getattr(m, "actuator_armature", ())):
+        if mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT:
+            why = f"has armature and acts on no joint; {only}"
+            raise ValueError(f"actuator {element_name(m, 'actuator', i)!r} {why}")
     refuse_numbers(m)
 
 
@@ -191,14 +186,14 @@ def refuse_numbers(m: mujoco.MjModel) -> None:
         values = getattr(m, field)
         for name in names_where(m, field, ~((values >= least) & (values <= MOST))):
             refuse_number(field.partition("_")[2], f" of {name!r}", values, least, MOST)
-    for word, values in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
-        refuse_number(word, "", values, -MOST, MOST)
+    for word, numbers in (("gravity", m.opt.gravity), ("qpos0", m.qpos0), ("qpos_spring", m.qpos_spring)):
+        refuse_number(word, "", numbers, -MOST, MOST)
     refuse_number("timestep", "", m.opt.timestep, *STEPS)
 
 
-def refuse_number(word: str, whose: str, values: ArrayLike, least: float, most: float) -> None:
+def refuse_number(word: str, owner: str, values: ArrayLike, least: float, most: float) -> None:
     """ValueError, with the number, where one of some numbers is not in a range."""
     for number in np.ravel(values).tolist():
         if not least <= number <= most:
             unit = UNITS.get(word, "")
-            raise ValueError(f"{word}{whose} is {number:g}{unit}; expected from {least:g} to {most:g}")
+            raise ValueError(f"{word}{owner} is {number:g}{unit}; expected from {least:g} to {most:g}")

@@ -20,6 +20,8 @@ MEMBERS = {
 INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
+# dynamics of an activation that settles where its control leads, or stays
+SETTLING = [getattr(mujoco.mjtDyn, f"mjDYN_{name}") for name in ("INTEGRATOR", "FILTER", "FILTEREXACT")]
 FREE_PARTS = ("x", "y", "z", "turn")
 
 
@@ -42,10 +44,7 @@ def on(m: mujoco.MjModel, flag: str) -> bool:
 
 
 def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
-    """The name of an element of a kind, by mujoco.MjModel's names of kinds.
-
-    `joint 3` where it has none that can be printed in a line; that is never the name of another element.
-    """
+    """The name of an element of a kind; `joint 3`, never another's name, where it has none that can be printed."""
     stated, type_of = getattr(m, kind)(int(number)).name, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
     name = stated if stated.strip() and stated.isprintable() else f"{kind} {int(number)}"
     while name != stated and mujoco.mj_name2id(m, type_of, name) >= 0:
@@ -53,21 +52,26 @@ def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
     return name
 
 
-def contact_name(m: mujoco.MjModel, d: mujoco.MjData, number: int) -> str:
-    """The two geoms of a contact of the data, or their bodies where they have no names."""
-    names = []
-    for geom in d.contact.geom[number]:
-        stated = m.geom(int(geom)).name
-        names.append(stated or element_name(m, "body", m.geom_bodyid[geom]))
-    return f"{names[0]} on {names[1]}" if names[0] != names[1] else names[0]
-
-
 def joint_name(m: mujoco.MjModel, number: Integer) -> str:
     return element_name(m, "joint", number)
 
 
+def geom_name(m: mujoco.MjModel, geom: Integer) -> str:
+    """The name of a geom, else that of its body."""
+    body = int(m.geom_bodyid[geom])
+    bearer = element_name(m, "body", body) if body else "the world"
+    return m.geom(int(geom)).name or f"a geom of {bearer}"
+
+
+def contact_name(m: mujoco.MjModel, d: mujoco.MjData, number: int) -> str:
+    """The two geoms of a contact of the data, or their bodies where they have no names."""
+    geoms = d.contact.geom[number].tolist()
+    names = [m.geom(geom).name or element_name(m, "body", m.geom_bodyid[geom]) for geom in geoms]
+    return " on ".join(dict.fromkeys(names))
+
+
 def names_where(m: mujoco.MjModel, field: str, holds: np.ndarray) -> list[str]:
-    """The names of the elements (of speeds: the joints) for which something holds of a number in their row of a field."""
+    """The names of the elements (of speeds: the joints) for which something holds in their row of a field."""
     prefix, rows = field.partition("_")[0], np.flatnonzero([row.any() for row in holds])
     if prefix == "dof":
         rows = np.unique(m.dof_jntid[rows])
@@ -101,15 +105,14 @@ def joint_places(m: mujoco.MjModel) -> dict[str, Place]:
         name, kind = joint_name(m, number), kind_of(m, number)
         is_free = kind == "free"
         joints += zip(parts_of(name), FREE, [number] * 4) if is_free else [(name, kind, number)]
-    names, kinds, numbers = zip(*joints)
-    coordinates = Coordinates(names, kinds)
+    coordinates = Coordinates(tuple(name for name, _, _ in joints), tuple(kind for _, kind, _ in joints))
     for columns in (coordinates.names, coordinates.positions, coordinates.speeds):
         if twice := sorted({name for name in columns if columns.count(name) > 1}):
             parts = "a ball w has the speeds w x, w y, w z, and a free joint the parts w x, w y, w z, w turn"
             raise ValueError(f"two of its joints are called {twice[0]!r}; {parts}")
     places = {}  # MuJoCo's vectors have the same order
-    for name, number, joint in zip(names, numbers, coordinates.places.joints):
-        places[name] = Place(joint.kind, number, range(joint.q.start, joint.q.stop), joint.speeds)
+    for (name, kind, number), joint in zip(joints, coordinates.places.joints):
+        places[name] = Place(kind, number, range(joint.q.start, joint.q.stop), joint.speeds)
     return places
 
 
@@ -120,10 +123,10 @@ def moving(m: mujoco.MjModel) -> np.ndarray:
 
 def aligns(joint: mujoco.MjsJoint) -> bool:
     """Whether the compiler turns the frame of a free joint's body into its inertial frame."""
-    asked = mujoco.mjtAlignFree.mjALIGNFREE_TRUE
-    if joint.compiler.alignfree and joint.align == mujoco.mjtAlignFree.mjALIGNFREE_AUTO:
-        asked = mujoco.mjtAlignFree.mjALIGNFREE_AUTO
-    return bool(joint.type == mujoco.mjtJoint.mjJNT_FREE and joint.align == asked)
+    options = mujoco.mjtAlignFree
+    is_left = joint.align == options.mjALIGNFREE_AUTO and bool(joint.compiler.alignfree)
+    is_free = joint.type == mujoco.mjtJoint.mjJNT_FREE
+    return bool(is_free and (is_left or joint.align == options.mjALIGNFREE_TRUE))
 
 
 def number_of_actuators(m: mujoco.MjModel) -> int:
@@ -139,31 +142,39 @@ def control_of(m: mujoco.MjModel, actuator: int) -> tuple[int, int]:
 
 
 def output_of(m: mujoco.MjModel, actuator: int) -> int:
-    """The index of the length, gear and moment of an actuator: since 4.0 an actuator may have several outputs."""
+    """The index of the length, gear and moment of an actuator: since 4.0 it may have several outputs."""
     return int(m.actuator_outadr[actuator]) if hasattr(m, "actuator_outadr") else actuator
 
 
-def rotors(m: mujoco.MjModel) -> np.ndarray:
-    """Armature of actuators times gear squared, (nv,), kg m2 or kg; ValueError for an actuator that acts on no joint.
+def set_control(m: mujoco.MjModel, actuator: int, u: float, ctrl: np.ndarray, act: np.ndarray) -> None:
+    """Put u of an actuator with one control where it belongs: (nu,) controls and (na,) activations.
 
-    MuJoCo takes the first number of the gear for every speed of the joint.
+    u of an integrator is its activation, at control 0; a filter's activation is where its control leads.
     """
-    for i in map(int, np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))):
-        if mujoco.mjtTrn(m.actuator_trntype[i]) not in OF_A_JOINT:
-            name = element_name(m, "actuator", i)
-            why = "has armature and acts on no joint; only that of joints is compared"
-            raise ValueError(f"actuator {name!r} {why}")
-    return reflected(m, "actuator_armature")
+    place, inputs = control_of(m, actuator)
+    kind = mujoco.mjtDyn(m.actuator_dyntype[actuator])
+    if inputs == 1:
+        ctrl[place] = 0.0 if kind == mujoco.mjtDyn.mjDYN_INTEGRATOR else u
+    if kind in SETTLING:
+        act[m.actuator_actadr[actuator]] = u
 
 
 def reflected(m: mujoco.MjModel, field: str) -> np.ndarray:
-    """A number of the actuators at joints, times gear squared, at the speeds of their joints, (nv,)."""
+    """A number of the actuators at joints, times gear squared, at the speeds of their joints, (nv,).
+
+    MuJoCo takes the first number of the gear for every speed of the joint.
+    """
     diagonal = np.zeros(m.nv)
     for i in map(int, np.flatnonzero(getattr(m, field, np.zeros(0)))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT:
             added = getattr(m, field)[i] * m.actuator_gear[output_of(m, i), 0] ** 2
             diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal
+
+
+def rotors(m: mujoco.MjModel) -> np.ndarray:
+    """Armature of actuators times gear squared, (nv,), kg m2 or kg."""
+    return reflected(m, "actuator_armature")
 
 
 def matrix(quat: ArrayLike) -> np.ndarray:

@@ -16,9 +16,10 @@ from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .engine import FROM_4
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
+from .locked import FROM_GEOMS
 from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
-from .source import FROM_GEOMS, Source, is_urdf
+from .source import Source, is_urdf
 
 # of the equations of motion
 STATED_FLAGS = {"flag gravity": "GRAVITY", "flag damper": "DAMPER", "flag eulerdamp": "EULERDAMP"}
@@ -98,7 +99,7 @@ class Stated(NamedTuple):
 
 
 def stated_numbers(source: Source) -> list[Stated]:
-    """Every mass, position, tensor, axis, armature, damping and stiffness that a file, or MJCF text, states for a model."""
+    """Every mass, position, tensor, axis, armature, damping and stiffness that a file, or MJCF text, states."""
     spec, model = source.spec, source.model
     if spec is None:
         return []
@@ -134,15 +135,14 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, nu
     place = row_of(Stated(name, "pos", pos, model.body_pos[number].copy()), aligned, length)
     if body.explicitinertial:
         stated_com, stated_inertia, length = stated_inertial(spec, body, com, inertia)
-        moments = float(np.trace(stated_inertia))
-        precision = TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
         of_mass = from_geoms | total | {"boundmass": body.mass < compiler.boundmass}
-        of_inertia = from_geoms | aligned | total | bounds
+        precision = TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
+        of_tensor, moments = Stated(name, "inertia", stated_inertia, inertia), float(np.trace(stated_inertia))
         return [
             place,
             row_of(Stated(name, "mass", float(body.mass), mass), of_mass),
             row_of(Stated(name, "com", stated_com, com), from_geoms | aligned, length),
-            row_of(Stated(name, "inertia", stated_inertia, inertia), of_inertia, moments, precision),
+            row_of(of_tensor, from_geoms | aligned | total | bounds, moments, precision),
         ]
     low, high = compiler.inertiagrouprange
     masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
@@ -157,12 +157,12 @@ def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, nu
 
 def of_joint(model: mujoco.MjModel, joint: mujoco.MjsJoint, number: int) -> list[Stated]:
     name, kind, dof = joint_name(model, number), kind_of(model, number), model.jnt_dofadr[number]
-    chosen = {"springdamper": bool(np.any(joint.springdamper))}
+    chosen, rows = {"springdamper": bool(np.any(joint.springdamper))}, []
     pos, turn, length = in_frames(joint.pos, joint.frame)
-    axis, rows = turn @ joint.axis / np.linalg.norm(joint.axis), []
     if kind in ("hinge", "ball"):
         rows.append(row_of(Stated(name, "anchor", pos, model.jnt_pos[number].copy()), {}, length))
     if kind in ("hinge", "slide"):
+        axis = turn @ joint.axis / np.linalg.norm(joint.axis)
         rows.append(row_of(Stated(name, "axis", axis, model.jnt_axis[number].copy()), {}))
     numbers = {"armature": model.dof_armature[dof], "damping": model.dof_damping[dof]}
     for quantity, compiled in (numbers | {"stiffness": model.jnt_stiffness[number]}).items():
@@ -173,36 +173,36 @@ def of_joint(model: mujoco.MjModel, joint: mujoco.MjsJoint, number: int) -> list
 
 
 def in_frames(pos: ArrayLike, frame: mujoco.MjsFrame | None) -> tuple[np.ndarray, np.ndarray, float]:
-    """A position, (3,), through a frame of the file and those around it, the turn of all, (3, 3), and the sum of lengths."""
+    """A position, (3,), through a frame of the file and those around it, the turn of all, and the sum of lengths."""
     place, turn = np.array(pos, float), np.eye(3)
     length = float(np.linalg.norm(place))
     while frame is not None:
-        R = matrix(orientation(frame.quat, frame.alt, frame.compiler))
+        R = orientation(frame.quat, frame.alt, frame.compiler)
         length += float(np.linalg.norm(frame.pos))
         place, turn, frame = frame.pos + R @ place, R @ turn, frame.frame
     return place, turn, length
 
 
 def orientation(quat: np.ndarray, other: mujoco.MjsOrientation, options: mujoco.MjsCompiler) -> np.ndarray:
-    """A quaternion of an orientation in any of the file's notations."""
-    if mujoco.mjtOrientation(other.type) != mujoco.mjtOrientation.mjORIENTATION_QUAT:
-        resolve = mujoco.MjSpec.resolve_orientation
-        return np.array(resolve(degree=bool(options.degree), sequence=options.eulerseq, orientation=other))
-    return quat / np.linalg.norm(quat)
+    """The rotation matrix of an orientation in any of the file's notations."""
+    if mujoco.mjtOrientation(other.type) == mujoco.mjtOrientation.mjORIENTATION_QUAT:
+        return matrix(quat / np.linalg.norm(quat))
+    resolve = mujoco.MjSpec.resolve_orientation
+    return matrix(resolve(degree=bool(options.degree), sequence=options.eulerseq, orientation=other))
 
 
 def stated_inertial(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, com: np.ndarray, inertia: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """CoM, (3,) m, and tensor, (3, 3) kg m2, that a body's inertial states, in the axes of the body; the sum of lengths, m.
+    """CoM, (3,) m, and tensor, (3, 3) kg m2, of a body's inertial, in the axes of the body; the sum of lengths, m.
 
-    A spec does not say in which of the body's frames the inertial is: in the one that comes closest to the compiled model.
+    A spec does not say in which of the body's frames it is: in the one that comes closest to the compiled model.
     """
-    xx, yy, zz, xy, xz, yz = body.fullinertia
-    stated = (
-        np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) if np.isfinite(xx) else np.diag(body.inertia)
-    )
-    turn = matrix(orientation(body.iquat, body.ialt, body.compiler))  # beside a fullinertia only in a URDF
+    stated = np.diag(body.inertia)
+    if np.isfinite(body.fullinertia[0]):
+        xx, yy, zz, xy, xz, yz = body.fullinertia
+        stated = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    turn = orientation(body.iquat, body.ialt, body.compiler)  # beside a fullinertia only in a URDF
     stated, scale = turn @ stated @ turn.T, np.abs(inertia).max() or 1.0
     candidates = []
     for frame in (None, *(frame for frame in spec.frames if frame.parent == body)):

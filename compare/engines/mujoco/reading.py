@@ -171,8 +171,8 @@ def carriers(model: mujoco.MjModel, places: Sequence[Place]) -> list[int]:
 def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     """MuJoCo with all that the Tree does not have switched off.
 
-    solution: the Tree and the order of the bodies are its; its joints have the names of the file's. ModelError if a joint does
-    not move as many bodies there.
+    solution: the Tree and the order of the bodies are its; its joints have the names of the file's. ModelError if a
+    joint does not move as many bodies there.
     """
     tree = (solution or reading).tree
     bodies = bodies_as_in(solution, reading) if solution else reading.bodies
@@ -180,7 +180,7 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
-    """The numbers of the bodies of a file in the order of those of a solution: on the same joint, by name or by their order."""
+    """The numbers of the bodies of a file in the order of a solution's: on the same joint, by name or by order."""
     numbers: dict[int, int] = {}
     for joint in solution.tree.joint_names:
         bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
@@ -201,13 +201,8 @@ def moved_by(reading: Reading, joint: str) -> dict[str, int]:
 
 def has_hinges(source: Source, names: Sequence[str]) -> bool:
     """Whether a file has exactly the hinges of these names, in any order."""
-    joints = [joint_name(source.model, j) for j in range(source.model.njnt)]
-    is_hinge = (source.model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE).all()
-    return bool(is_hinge) and sorted(joints) == sorted(names)
-
-
-def load(path: str | Path, tree: tmt.Tree) -> Mujoco:
-    return parse(Path(path), tree)
+    joints = {joint_name(source.model, j): kind_of(source.model, j) for j in range(source.model.njnt)}
+    return joints == dict.fromkeys(names, "hinge")
 
 
 def parse(origin: Source | Path | str, tree: tmt.Tree) -> Mujoco:
@@ -227,12 +222,12 @@ def parse(origin: Source | Path | str, tree: tmt.Tree) -> Mujoco:
         expected = f"expected exactly the hinges {', '.join(hinges)}"
         raise ModelError(f"{source} has the joints {joints}; {expected}")
     for name, hinge in zip(tree.body_names, tree.body_joint):
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
         if hinge >= 0 and tree.body_joint.count(hinge) == 1:
-            bodies.append(int(model.jnt_bodyid[names[hinges[hinge]]]))
-        elif (number := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)) >= 0:
-            bodies.append(number)
-        else:
+            number = int(model.jnt_bodyid[names[hinges[hinge]]])
+        if number < 0:
             raise ModelError(f"{source} has no body {name!r}, and no hinge identifies it")
+        bodies.append(number)
     of_hinges = sorted(set(model.jnt_bodyid.tolist()))
     if len(set(bodies)) < len(bodies) == len(of_hinges):  # hinges of two bodies have exchanged their names
         bodies = of_hinges

@@ -3,20 +3,24 @@
 A deviation of a state is a movement of the positions (nv,), the speeds (nv,) and the activations (na,), in this order.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-from .names import INTEGRATORS, bit, number_of_actuators
+from ...robots.actuators import Drive
+from .names import INTEGRATORS, bit, element_name, number_of_actuators, output_of, set_control
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
 TOLERANCE, ITERATIONS, LINE_SEARCH = 1e-15, 200, 100  # of MuJoCo's solver: the force of constraints, exactly
 NUDGE = 1e-7  # rad, m and their rates: of central differences
+LITTLE = 1e-6  # of an activation at the start of a run that is pushed
 SLEEP = int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0))
 RELAXING = [name for name in ("implicitfast", "discrete") if name in INTEGRATORS]  # the second bears most
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
+Act = Callable[[int], None]  # before a step of a run, by its number
 
 
 class Step:
@@ -52,9 +56,7 @@ class Step:
 
     def state(self) -> np.ndarray:
         """The state that the data have."""
-        state = np.zeros(mujoco.mj_stateSize(self.model, STATE))
-        mujoco.mj_getState(self.model, self.data, state, STATE)
-        return state
+        return state_of(self.model, self.data)
 
     def put(self, state: np.ndarray, by: np.ndarray | None = None) -> None:
         """Set the data to a state, moved by a deviation."""
@@ -88,10 +90,10 @@ class Step:
 
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
         """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`."""
-        columns = [
-            (self.after(state, ahead) - self.after(state, behind)) / (ahead - behind).sum()
-            for ahead, behind in self.sides(state, nudge)
-        ]
+        columns = []
+        for ahead, behind in self.sides(state, nudge):
+            moved = self.after(state, ahead) - self.after(state, behind)
+            columns.append(moved / (ahead - behind).sum())
         return np.array(columns).T
 
     def sides(self, state: np.ndarray, nudge: float) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -102,15 +104,25 @@ class Step:
         self.put(state)
         act, (low, high) = self.data.act.copy(), activation_ranges(self.model)
         ahead, behind = nudge * np.eye(self.size), -nudge * np.eye(self.size)
-        for place in range(self.model.na):
-            column = 2 * self.model.nv + place
-            ahead[column] *= act[place] + nudge <= high[place]
-            behind[column] *= act[place] - nudge >= low[place]
+        first = 2 * self.model.nv
+        ahead[first:] *= (act + nudge <= high)[:, None]
+        behind[first:] *= (act - nudge >= low)[:, None]
         return list(zip(ahead, behind))
 
     def contacts(self) -> int:
         """The number of contacts of the data."""
         return int(self.data.ncon)
+
+    def touching(self, state: np.ndarray, by: np.ndarray) -> set[str]:
+        """The pairs of geoms whose contacts have forces at a state that is moved, and how many contacts each has."""
+        self.put(state, by)
+        mujoco.mj_forward(self.model, self.data)
+        contacts = self.data.contact
+        pairs = [tuple(pair) for pair in contacts.geom[contacts.efc_address >= 0].tolist()]
+        names = {
+            pair: " and ".join(element_name(self.model, "geom", geom) for geom in pair) for pair in pairs
+        }
+        return {f"{name} ({pairs.count(pair)})" for pair, name in names.items()}
 
     def lengths(self) -> np.ndarray:
         """Of all outputs of the actuators at the data's state."""
@@ -125,9 +137,9 @@ class Step:
         return self.commands_now(servos)
 
     def commands_now(self, servos: Sequence[Servo]) -> np.ndarray:
-        mujoco.mj_fwdPosition(self.model, self.data)
+        length = self.lengths()
         mujoco.mj_fwdVelocity(self.model, self.data)
-        length, speed = self.data.actuator_length, self.data.actuator_velocity
+        speed = self.data.actuator_velocity
         return np.array([servo.force(length[servo.output], speed[servo.output]) for servo in servos])
 
     def by_control(self, state: np.ndarray, controls: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
@@ -142,11 +154,12 @@ class Step:
             columns.append((ends[0] - ends[1]) / (2.0 * nudge))
         return np.array(columns).reshape(-1, self.size).T
 
-    def run(self, state: np.ndarray, steps: int) -> Iterator[mujoco.MjData]:
+    def run(self, state: np.ndarray, steps: int, act: Act = lambda step: None) -> Iterator[mujoco.MjData]:
         """The data after each step of a run, until a number in it is bad."""
         self.put(state)
         self.data.warning.number[:] = 0
-        for _ in range(steps):
+        for step in range(steps):
+            act(step)
             mujoco.mj_step(self.model, self.data)
             if self.data.warning.number[BAD].any():
                 return
@@ -155,18 +168,16 @@ class Step:
     def run_program(
         self, state: np.ndarray, servos: Sequence[Servo], steps: int, period: int, delay: int
     ) -> Iterator[mujoco.MjData]:
-        """As `run`, with the servos' controls from a program that reads every `period` steps; it acts `delay` steps later."""
+        """A run whose servos' controls a program reads every `period` steps; they act `delay` steps later."""
         places, read = [servo.control for servo in servos], []
-        self.put(state)
-        for step in range(steps):
+
+        def act(step: int) -> None:
             if step % period == 0:
                 read.append(self.commands_now(servos))
             if step >= delay:
                 self.data.ctrl[places] = read[(step - delay) // period]
-            mujoco.mj_step(self.model, self.data)
-            if self.data.warning.number[BAD].any():
-                return
-            yield self.data
+
+        return self.run(state, steps, act)
 
     def relaxed(self, state: np.ndarray, seconds: float, rate: float, still: float) -> np.ndarray:
         """Where a run leads whose speeds decay at a rate, 1/s, more; it ends when nothing moves faster than `still`."""
@@ -177,6 +188,67 @@ class Step:
             if np.abs(data.qvel).max() < still and np.abs(data.qacc).max() < still / self.dt:
                 break
         return state if end is state else self.state()
+
+
+class WholeRun(NamedTuple):
+    """A run of a file's model as it is."""
+
+    speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
+    failed_at: float | None  # s: MuJoCo warns of a bad number; None: it runs on
+
+
+def whole_run(
+    model: mujoco.MjModel, start: np.ndarray, dt: float, integrator: str, lasts: float, parts: int
+) -> WholeRun:
+    """A run from start_of a model with all that the file has, for `lasts` s or until it fails."""
+    step, count = Step(model, dt, integrator, exact=False), max(1, round(lasts / parts / dt))
+    squares = np.full(parts * count, np.nan)
+    for k, data in enumerate(step.run(start, parts * count)):
+        squares[k] = data.qvel @ data.qvel / model.nv
+    speeds, failed = (
+        np.sqrt(squares.reshape(parts, count).mean(axis=1)),
+        np.flatnonzero(~np.isfinite(squares)),
+    )
+    return WholeRun(speeds, float(failed[0] + 1) * dt if len(failed) else None)
+
+
+def start_of(
+    model: mujoco.MjModel,
+    drive: Drive,
+    key: str,
+    push: np.ndarray,
+    q: np.ndarray | None = None,
+    controls: Sequence[float | None] = (),
+) -> np.ndarray:
+    """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
+
+    q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.
+    Where no controls are stated the targets of servos are the posture; activations
+    are those of the keyframe, if it states any.
+    """
+    data, keys = mujoco.MjData(model), [element_name(model, "key", k) for k in range(model.nkey)]
+    if key:
+        mujoco.mj_resetDataKeyframe(model, data, keys.index(key))
+    stated = data.act.copy()
+    if q is not None:
+        data.qpos[:], data.qvel[:] = q, 0.0
+    data.qvel[:] += push
+    mujoco.mj_fwdPosition(model, data)
+    lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
+    for i, u in enumerate(drive.control(key, lengths).tolist()):
+        asked = controls[i] if controls else None
+        set_control(model, i, u if asked is None else asked, data.ctrl, data.act)
+    if stated.any():
+        data.act[:] = np.clip(stated, *activation_ranges(model))
+    if push.any():  # activations, too: what is pushed nowhere stays where it is
+        data.act[:] = np.clip(data.act + LITTLE, *activation_ranges(model))
+    return state_of(model, data)
+
+
+def state_of(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    state = np.zeros(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
 
 
 def activation_ranges(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:

@@ -5,10 +5,9 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from ...robots.actuators import Actuator
+from .actuators import actuator, is_affine
 from .names import bit, control_of, kind_of, number_of_actuators, output_of
-
-KNOWN_GAINS = {mujoco.mjtGain.mjGAIN_FIXED: 1, mujoco.mjtGain.mjGAIN_AFFINE: 3}  # how many numbers a law has
-KNOWN_BIASES = {mujoco.mjtBias.mjBIAS_NONE: 0, mujoco.mjtBias.mjBIAS_AFFINE: 3}
 
 
 def copied(model: mujoco.MjModel) -> mujoco.MjModel:
@@ -16,16 +15,11 @@ def copied(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def has_free_base(model: mujoco.MjModel) -> bool:
-    return any(kind_of(model, joint) == "free" for joint in range(model.njnt))
-
-
-def of_free_joints(model: mujoco.MjModel) -> np.ndarray:
-    """Which speeds are those of free joints, (nv,)."""
-    return np.array(model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE)
+    return bool((model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).any())
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
-    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base, and not what it holds."""
+    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base, not what it holds."""
     free = [joint for joint in range(model.njnt) if kind_of(model, joint) == "free"]
     carried = [float(model.body_subtreemass[model.jnt_bodyid[joint]]) for joint in free]
     base = free[int(np.argmax(carried))] if free else -1
@@ -43,9 +37,8 @@ def in_the_air(model: mujoco.MjModel) -> mujoco.MjModel:
 
 def without_dry_friction(model: mujoco.MjModel) -> mujoco.MjModel | None:
     """Without the dry friction of joints and tendons; None: there is none."""
-    if model.opt.disableflags & bit("FRICTIONLOSS") or not (
-        model.dof_frictionloss.any() or model.tendon_frictionloss.any()
-    ):
+    has_friction = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
+    if model.opt.disableflags & bit("FRICTIONLOSS") or not has_friction:
         return None
     smooth = copied(model)
     smooth.dof_frictionloss[:] = 0.0
@@ -63,22 +56,20 @@ def add_armature(model: mujoco.MjModel, more: np.ndarray) -> None:
 
 
 class Servo(NamedTuple):
-    """What a program computes for an actuator: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, within its range.
+    """An actuator whose law a program computes within its range of force.
 
-    control: the number of its control; output: of its length. u: what it is told; low, high: N or N m over the gear.
+    control: the number of its control; output: of its length. u: what the program is told; low, high: N, N m.
     """
 
+    law: Actuator
     control: int
     output: int
-    gain: np.ndarray  # (3,)
-    bias: np.ndarray  # (3,)
     u: float
     low: float
     high: float
 
     def force(self, length: float, speed: float) -> float:
-        seen = np.array([1.0, length, speed])
-        return float(np.clip(self.gain @ seen * self.u + self.bias @ seen, self.low, self.high))
+        return float(np.clip(self.law.force(self.u, length, speed), self.low, self.high))
 
 
 def held_servos(
@@ -87,45 +78,45 @@ def held_servos(
     """The model with motors in place of its servos, and the laws by which a program commands them.
 
     Position and velocity servos keep their gains. With kp, kv the other actuators of constant gain follow
-    kp (target - length) - kv speed in units of their force. controls: of the file, (nu,); targets: lengths, of each output.
+    kp (target - length) - kv speed in units of their force. controls: of the file, (nu,); targets: of each output.
     """
     motors, servos = copied(model), []
     for i in range(number_of_actuators(model)):
+        law, output = actuator(model, i), output_of(model, i)
         place, inputs = control_of(model, i)
-        law = mujoco.mjtGain(model.actuator_gaintype[i]), mujoco.mjtBias(model.actuator_biastype[i])
-        if inputs != 1 or law[0] not in KNOWN_GAINS or law[1] not in KNOWN_BIASES:
-            continue
-        gain, bias, output = np.zeros(3), np.zeros(3), output_of(model, i)
-        gain[: KNOWN_GAINS[law[0]]] = model.actuator_gainprm[i, : KNOWN_GAINS[law[0]]]
-        bias[: KNOWN_BIASES[law[1]]] = model.actuator_biasprm[i, : KNOWN_BIASES[law[1]]]
         u = float(controls[place])
-        if not (bias[1:].any() or gain[1:].any()):
+        if inputs != 1 or not is_affine(model, i):
+            continue
+        if not law.feeds_back:
             if kp is None:
                 continue
-            u, gain, bias = 1.0, np.zeros(3), np.array([kp * targets[output], -kp, -(kv or 0.0)])
-        limits = (-np.inf, np.inf) if not model.actuator_forcelimited[i] else model.actuator_forcerange[i]
-        servos.append(Servo(place, output, gain, bias, u, float(limits[0]), float(limits[1])))
-        motors.actuator_gaintype[i], motors.actuator_biastype[i] = (
-            mujoco.mjtGain.mjGAIN_FIXED,
-            mujoco.mjtBias.mjBIAS_NONE,
-        )
-        motors.actuator_gainprm[i, :3], motors.actuator_dyntype[i] = (1.0, 0.0, 0.0), mujoco.mjtDyn.mjDYN_NONE
-        motors.actuator_ctrllimited[place] = 0
+            u, law = 1.0, Actuator(law.name, law.joint, law.moment, bias=servo_bias(kp, kv, targets[output]))
+        limits = model.actuator_forcerange[i] if model.actuator_forcelimited[i] else (-np.inf, np.inf)
+        servos.append(Servo(law, place, output, u, *map(float, limits)))
+        set_law(motors, i, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        motors.actuator_dyntype[i], motors.actuator_ctrllimited[place] = mujoco.mjtDyn.mjDYN_NONE, 0
     return motors, servos
 
 
 def with_servos(model: mujoco.MjModel, kp: float, kv: float, targets: np.ndarray) -> mujoco.MjModel:
     """The model whose motors are servos of MuJoCo with these gains: where it rests, a program's servos rest."""
     servos = copied(model)
-    for i in range(number_of_actuators(model)):
-        if mujoco.mjtBias(model.actuator_biastype[i]) == mujoco.mjtBias.mjBIAS_NONE:
-            servos.actuator_gaintype[i], servos.actuator_biastype[i] = (
-                mujoco.mjtGain.mjGAIN_FIXED,
-                mujoco.mjtBias.mjBIAS_AFFINE,
-            )
-            servos.actuator_gainprm[i, 0] = 0.0
-            servos.actuator_biasprm[i, :3] = kp * targets[output_of(model, i)], -kp, -kv
+    for i in np.flatnonzero(model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE).tolist():
+        set_law(servos, i, (0.0, 0.0, 0.0), servo_bias(kp, kv, targets[output_of(model, i)]))
     return servos
+
+
+def servo_bias(kp: float, kv: float | None, target: float) -> tuple[float, float, float]:
+    return kp * target, -kp, -(kv or 0.0)
+
+
+def set_law(model: mujoco.MjModel, i: int, gain: tuple[float, ...], bias: tuple[float, ...]) -> None:
+    """Give an actuator of a compiled model a law of constant gain, of three numbers each."""
+    model.actuator_gaintype[i], model.actuator_biastype[i] = (
+        mujoco.mjtGain.mjGAIN_FIXED,
+        mujoco.mjtBias.mjBIAS_AFFINE,
+    )
+    model.actuator_gainprm[i, :3], model.actuator_biasprm[i, :3] = gain, bias
 
 
 # changes that may make a step stable; None: there is nothing to change
@@ -143,11 +134,10 @@ def with_kv(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
 
 def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
     """With armature of a factor times the least inertia of each joint at qpos0 more; none of a free joint."""
-    data, changed = mujoco.MjData(model), copied(model)
-    mujoco.mj_resetData(model, data)
-    mujoco.mj_forward(model, data)
-    own = 1.0 / np.maximum(model.dof_invweight0, mujoco.mjMINVAL)
-    add_armature(changed, np.where(of_free_joints(model), 0.0, factor * own))
+    changed = copied(model)
+    least = 1.0 / np.maximum(model.dof_invweight0, mujoco.mjMINVAL)
+    is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
+    add_armature(changed, np.where(is_free, 0.0, factor * least))
     return changed
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import mujoco
 import numpy as np
 
-from ...robots.inertia import point_inertia
+from ...robots.coordinates import point_inertia
 from .names import element_name, tensor
 
 # kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other

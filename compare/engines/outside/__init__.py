@@ -139,7 +139,8 @@ class OutsideDynamics(OneByOne):
         return quantity in self.reading["has"]
 
     def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
-        if different := [number for number, is_set in self.reading["mended"].items() if not is_set]:
+        different = [number for number, is_set in self.reading["mended"].items() if not is_set]
+        if self.is_set and different:
             raise EngineError(f"it has read another {listed(different)}, which cannot be set")
         return super().prepare(q, v, tau, setting, method)
 

@@ -98,18 +98,15 @@ def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:
     model.prepare(course)
     seconds = time.perf_counter() - begin
     step = model.step_alone(course) if course.steps else None
-    return seconds, None if step is None else seconds_of_step(step)
-
-
-def seconds_of_step(step: Callable[[], object]) -> float:
-    """The least time of a step, in runs of several steps."""
+    if step is None:
+        return seconds, None
     count = 1 + int(timing.WARM / timing.fastest({"": step}, 3)[""])
 
     def steps() -> None:
         for _ in range(count):
             step()
 
-    return timing.fastest({"": steps}, 5)[""] / count
+    return seconds, timing.fastest({"": steps}, 5)[""] / count
 
 
 def batched(model: ReadModel, course: Course) -> tuple[float, float, str, np.ndarray]:

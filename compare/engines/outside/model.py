@@ -2,23 +2,23 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import ClassVar, NamedTuple, TypedDict
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import tmt
 from tmt.derivation.method import joint_frames
 from tmt.methods import by_speed
 
 from ...robots.case import SEED
-from ...robots.coordinates import Coordinates, free_joints
-from ...robots.inertia import point_inertia
+from ...robots.coordinates import Coordinates, free_joints, point_inertia
 from .. import Array, Course
 
 Numbers = Mapping[str, Array]
 # what an engine reads: the robot's file, the model that MuJoCo compiled, or a URDF that this program writes of that
 FROM_FILE, FROM_COMPILED, FROM_URDF = "file", "compiled", "urdf"
+STILL = 1e-3  # rad or m: what a movement of 1 moves goes further
 
 
 class File(NamedTuple):
@@ -54,12 +54,24 @@ class Body(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A body as engines list it."""
+    """A body as an engine lists it, at a posture."""
 
     name: object  # of the engine: text or a number
     parent: object
     joint: int | None  # of the Tree, by which it moves on its parent; None: it is fixed there
-    body: Body
+    turn: Array  # (3, 3) from its axes to those of the world
+    origin: Array  # (3,) m in the world
+    body: Body  # in its axes
+
+    @property
+    def in_world(self) -> Body:
+        mass, com, inertia = self.body
+        return Body(mass, self.origin + self.turn @ com, self.turn @ inertia @ self.turn.T)
+
+    def in_own_axes(self, body: Body) -> Body:
+        """A body of the world in the axes of this link."""
+        com = self.turn.T @ (body.com - self.origin)
+        return Body(body.mass, com, self.turn.T @ body.inertia @ self.turn)
 
 
 class EngineError(ValueError):
@@ -114,13 +126,15 @@ class ReadModel:
     m, N m, N. No contacts, limits, actuators or friction losses act. The quantities of one state; q (nq,), v, tau (nv,).
     """
 
+    share: ClassVar[float] = 1e-13  # of the largest, that a number loses where it is set
     # numbers of the Tree that its equations do not have at all: they act as part of the torque
     drops: ClassVar[tuple[str, ...]] = ()
     way: ClassVar[str] = FROM_FILE
     unwritten: ClassVar[tuple[str, ...]] = ()  # numbers that a URDF cannot state
     has_places: ClassVar[bool] = False  # whether it tells where bodies and joints are
     copied: tuple[str, str] | None = None  # why it has read a copy of the file
-    stated: Numbers = MappingProxyType({})  # before its numbers are read: numbers_of the Tree
+    file: File
+    stated: Numbers  # numbers_of the Tree
     reading: Reading
 
     def __init__(self, file: File, precision: str):
@@ -142,45 +156,73 @@ class ReadModel:
         the joints there axis (joints, 3) and anchor (joints, 3) m, on the axis of a hinge next to the stated one, at the
         centre of a ball; 0 where that says nothing. com_moved, axis_moved and anchor_moved are those at the positions `moved`.
         """
-        q = self.stated["reference"] if self.has_places else np.zeros(0)
-        mass, com, inertia = map(np.array, zip(*map(combined, self.bodies(q))))
+        links = self.links(self.stated["reference"])
+        mass, com, inertia = together(links, len(self.file.names))
         numbers = {**self.fields(), "mass": mass, "moments": np.linalg.eigvalsh(inertia)}
         if self.has_places:
-            numbers |= {"com": com, "inertia": inertia, **self.lines(q, "")}
             moved = self.stated["moved"]
-            bodies = map(combined, self.bodies(moved))
-            numbers |= {"com_moved": np.array([body.com for body in bodies]), **self.lines(moved, "_moved")}
+            numbers |= {"com": com, "inertia": inertia, **self.lines(self.stated["reference"], "")}
+            _, numbers["com_moved"], _ = together(self.links(moved), len(self.file.names))
+            numbers |= self.lines(moved, "_moved")
         return numbers
 
     def lines(self, q: Array, ending: str) -> Numbers:
-        """axis and anchor of `numbers` at positions q."""
-        axis, anchor = (self.stated[f"{name}{ending}"].copy() for name in ("axis", "anchor"))
-        for joint, (linear, angular, point) in self.twists(q).items():
-            if not axis[joint].any():  # a ball
-                anchor[joint] = point * anchor[joint].any()
-                continue
-            axis[joint] = angular if angular.any() else linear
-            if angular.any():
-                on_axis = point + np.cross(angular, linear)
-                anchor[joint] = on_axis + (anchor[joint] - on_axis) @ angular * angular
-        return {f"axis{ending}": axis, f"anchor{ending}": anchor}
-
-    def twists(self, q: Array) -> Mapping[int, tuple[Array, Array, Array]]:
-        """Of joints of the Tree, at positions q: velocity of a point of the moved body per unit of speed, angular velocity, and
-        the point, in the world; of a ball zero, zero and its centre."""
-        raise NotImplementedError
+        """axis and anchor of `numbers` at positions q: by what a movement of each joint alone, of 1 rad or m, does to a link."""
+        axes, anchors = (self.stated[f"{name}{ending}"].copy() for name in ("axis", "anchor"))
+        coordinates, before = self.file.coordinates, self.links(q)
+        for joint, axis, anchor in zip(coordinates.places.joints, axes, anchors):
+            equations = []  # (1 - turn) anchor = shift, of each movement
+            for speed in np.eye(coordinates.nv)[joint.qd] if axis.any() or anchor.any() else ():
+                turn, shift = movement(before, self.links(coordinates.move(q, speed)))
+                equations.append(np.column_stack([np.eye(3) - turn, shift]))
+                if axis.any():
+                    axis[:] = shift if joint.kind == "slide" else Rotation.from_matrix(turn).as_rotvec()
+            if anchor.any():
+                system = np.vstack(equations)
+                rest = system[:, 3] - system[:, :3] @ anchor
+                anchor += np.linalg.lstsq(system[:, :3], rest, rcond=1e-3)[0]
+        return {f"axis{ending}": axes, f"anchor{ending}": anchors}
 
     def fields(self) -> Numbers:
         """What it has read that is not of bodies."""
         raise NotImplementedError
 
-    def bodies(self, q: Array) -> Sequence[Sequence[Body]]:
-        """Of each joint the bodies that move with it and not with the next one; where has_places at positions q."""
+    def links(self, q: Array) -> list[Link]:
+        """Its bodies; where has_places at positions q."""
+        raise NotImplementedError
+
+    def set_field(self, name: str, values: Array) -> bool:
+        """Set one of `fields`; False: that is not possible."""
+        return False
+
+    def set_body(self, link: Link, body: Body) -> None:
+        """Set mass, centre of mass and inertia of a link, in its axes; all 0: none."""
         raise NotImplementedError
 
     def mend(self, name: str, values: Array) -> bool:
-        """Set numbers that it has read differently, of the same shape as in `numbers`; False: that is not possible."""
-        return False
+        """Set numbers that it has read differently, of the same shape as in `numbers`; False: that is not possible.
+
+        Of the links that move as one, the first has all the mass.
+        """
+        if name in self.fields():
+            return self.set_field(name, values)
+        if type(self).set_body is ReadModel.set_body:
+            return False
+        read, stated, links = self.numbers(), self.stated, self.links(self.stated["reference"])
+        # where only com and inertia differ, bodies are at another place
+        right = self.near(read["mass"], stated["mass"]) & self.near(read["moments"], stated["moments"])
+        joints = movers(links)
+        for joint in np.flatnonzero(~right).tolist():
+            body = Body(stated["mass"][joint], stated["com"][joint], stated["inertia"][joint])
+            for link in [link for link, mover in zip(links, joints) if mover == joint]:
+                self.set_body(link, link.in_own_axes(body) if body.mass else body)
+                body = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        return bool(self.near(self.numbers()[name], values).all())
+
+    def near(self, read: Array, stated: Array) -> Array:
+        """Whether numbers that were set are those stated, for each joint."""
+        is_near = np.abs(read - stated) <= self.share * np.abs(stated).max(initial=0.0)
+        return np.asarray(is_near.reshape(len(stated), -1).all(axis=1))
 
     def mass_matrix(self, q: Array) -> Array:
         """M (nv, nv), with the armature."""
@@ -220,6 +262,39 @@ class ReadModel:
         raise NotImplementedError
 
 
+class SteppedModel(ReadModel):
+    """An engine whose steps Python asks for, one by one."""
+
+    def start(self, course: Course) -> None:
+        """Prepare the steps of a course from its start."""
+        raise NotImplementedError
+
+    def engine_step(self) -> None:
+        """The engine's own step, from where it is."""
+        raise NotImplementedError
+
+    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
+        """q and v after a step from speeds v."""
+        raise NotImplementedError
+
+    def springs(self, q: Array) -> Array | float:
+        """The force of springs that the engine does not have."""
+        return 0.0
+
+    def step_alone(self, course: Course) -> Callable[[], object]:
+        self.start(course)
+        return self.engine_step
+
+    def run(self, course: Course) -> tuple[Array, int]:
+        (q, v), states = course[:2], [course.start]
+        self.start(course)
+        for step in range(1, course.steps + 1):
+            q, v = self.step(course.force(q, v) + self.springs(q), v)
+            if step % course.every == 0:
+                states.append(np.concatenate([q, v]))
+        return np.array(states), course.steps
+
+
 def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
     """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
     nv, zero = tree.coordinates.nv, np.array(tree.zero)
@@ -243,16 +318,20 @@ def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
 def placed(tree: tmt.Tree, q: Array) -> tuple[Array, ...]:
     """mass, com and inertia of ReadModel.numbers at positions q of a Tree; origin and axis of each joint, (joints, 3)."""
     frames = joint_frames(tree, q.tolist())
-    origins = np.array([[*frame.origin] for frame in frames])
-    turns = np.array([[[*row] for row in frame.turn] for frame in frames])
     axes = [[0.0] * 3 if kind == "ball" else [*frame.axes[0]] for kind, frame in zip(tree.kind, frames)]
-    groups: list[list[Body]] = [[] for _ in frames]
-    for body, joint in enumerate(tree.body_joint):
+    origins = np.array([[*frame.origin] for frame in frames])
+    return *together(links_of(tree, q), len(frames)), origins, np.array(axes)
+
+
+def links_of(tree: tmt.Tree, q: Array) -> list[Link]:
+    """The bodies of a Tree at positions q that a joint moves."""
+    frames, links = joint_frames(tree, q.tolist()), []
+    for number, joint in enumerate(tree.body_joint):
         if joint >= 0:
-            turn, inertia = turns[joint], np.array(tree.inertia[body])
-            com = origins[joint] + turn @ tree.com[body]
-            groups[joint].append(Body(tree.mass[body], com, turn @ inertia @ turn.T))
-    return *map(np.array, zip(*map(combined, groups))), origins, np.array(axes)
+            turn = np.array([[*row] for row in frames[joint].turn])
+            body = Body(tree.mass[number], np.array(tree.com[number]), np.array(tree.inertia[number]))
+            links.append(Link(number, None, joint, turn, np.array([*frames[joint].origin]), body))
+    return links
 
 
 def size_of(stated: Numbers, number: str) -> float:
@@ -270,16 +349,35 @@ def size_of(stated: Numbers, number: str) -> float:
     return largest[number]
 
 
-def carried(links: Iterable[Link], joints: int) -> list[list[Body]]:
-    """The bodies that move with each of the Tree's joints and not with the next one. Parents come before their children."""
+def movers(links: Sequence[Link]) -> list[int | None]:
+    """The Tree's joint with which each link moves, and not with the next one; None: none moves it."""
+    by_name = {link.name: link for link in links}
+
+    def mover(link: Link | None) -> int | None:
+        while link is not None and link.joint is None:
+            link = by_name.get(link.parent)
+        return link.joint if link else None
+
+    return [mover(link) for link in links]
+
+
+def together(links: Sequence[Link], joints: int) -> tuple[Array, Array, Array]:
+    """mass, com and inertia of ReadModel.numbers."""
     bodies: list[list[Body]] = [[] for _ in range(joints)]
-    moved_by: dict[object, int | None] = {}  # the joint that moves a link
-    for link in links:
-        joint = moved_by.get(link.parent) if link.joint is None else link.joint
-        moved_by[link.name] = joint
+    for link, joint in zip(links, movers(links)):
         if joint is not None:
-            bodies[joint].append(link.body)
-    return bodies
+            bodies[joint].append(link.in_world)
+    mass, com, inertia = map(np.array, zip(*map(combined, bodies)))
+    return mass, com, inertia
+
+
+def movement(before: Sequence[Link], after: Sequence[Link]) -> tuple[Array, Array]:
+    """Turn and shift of the first link that moves: x becomes turn x + shift; those of no movement if none does."""
+    for link, moved in zip(before, after):
+        turn = moved.turn @ link.turn.T
+        if np.abs(turn - np.eye(3)).max() > STILL or np.abs(moved.origin - link.origin).max() > STILL:
+            return turn, moved.origin - turn @ link.origin
+    return np.eye(3), np.zeros(3)
 
 
 def combined(bodies: Iterable[tuple[float, Array, Array]]) -> Body:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ...robots.actuators import Controller
 from .. import GRID, Array, Course
-from .model import FROM_COMPILED, File, Numbers, ReadModel
+from .model import FROM_COMPILED, File, Numbers, ReadModel, Unread
 
 if TYPE_CHECKING:
     from ..mujoco.handed_on import Bare
@@ -20,23 +20,33 @@ STAGES = {"Euler": 1, "implicitfast": 1, "implicit": 1, "discrete": 1, "RK4": 4}
 
 class OfCompiled(ReadModel):
     way = FROM_COMPILED
-    bare: Bare
-    models: dict[str, Any]  # the engine's, by the names of METHODS
+    methods: ClassVar[tuple[str, ...]] = tuple(METHODS)
+    rotors_in_joints: ClassVar[bool] = False  # the armature of actuators is that of their joints
 
     def __init__(self, file: File, precision: str):
         self.file, self.precision = file, precision
         self.controllers: dict[tuple[float | None, ...], Controller] = {}
-        self.fields_set: dict[
-            str, tuple[Array, Array]
-        ] = {}  # by MuJoCo's names: indices, and the values that are set there
+        # by MuJoCo's names: indices, and the values that are set there
+        self.fields_set: dict[str, tuple[Array, Array]] = {}
         self.driven = cache(self.made_driven)
+        self.bare = self.made_bare(None)
+        self.models = self.made_models(self.bare)
 
     def made_bare(self, controller: Controller | None) -> Bare:
         """The model that the engine takes, whose actuators act if there is a controller."""
-        raise NotImplementedError
+        from ..mujoco.handed_on import Bare
+
+        return Bare(self.file.path, self.file.names, self.rotors_in_joints, controller)
 
     def made_models(self, bare: Bare) -> dict[str, Any]:
-        """The engine's models of it by the names of METHODS; Unread if it does not have what that needs."""
+        """The engine's models of it by the names of methods; Unread if it does not have what that needs."""
+        try:
+            return {name: self.put_model(bare.with_integrator(name)) for name in self.methods}
+        except NotImplementedError as error:
+            raise Unread(f"it does not have what it needs: {error}") from None
+
+    def put_model(self, model: Any) -> Any:
+        """The engine's model of one of MuJoCo's."""
         raise NotImplementedError
 
     def made_driven(self, key: tuple[float | None, ...]) -> tuple[Bare, dict[str, Any]]:

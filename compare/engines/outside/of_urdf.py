@@ -3,17 +3,15 @@
 What a URDF cannot state is set by this program, and is no loss of the engine's.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
-from .. import Array, Course
-from .model import FROM_URDF, File, Numbers, ReadModel, Unasked, Unwritten
+from .. import Array
+from .model import FROM_URDF, File, Numbers, SteppedModel, Unasked, Unwritten
 
 SPEEDS = "armature", "damping", "stiffness"  # numbers of each speed
 
 
-class OfUrdf(ReadModel):
+class OfUrdf(SteppedModel):
     """A URDF has no gravity, springs or armature; these are set afterwards."""
 
     way = FROM_URDF
@@ -51,39 +49,15 @@ class OfUrdf(ReadModel):
     def set_gravity(self, gravity: Array) -> None:
         raise NotImplementedError
 
-    def start(self, q: Array, v: Array, dt: float, damping: Array) -> None:
-        """Prepare steps of dt from a state, with this damping of the joints."""
-        raise NotImplementedError
-
-    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
-        """q and v after a step from speeds v."""
-        raise NotImplementedError
-
-    def own_step(self) -> None:
-        """The engine's own step, from where it is."""
-        raise NotImplementedError
-
-    def step_alone(self, course: Course) -> Callable[[], object]:
-        self.start(course.q, course.v, course.dt, self.damping)
-        return self.own_step
-
-    def run(self, course: Course) -> tuple[Array, int]:
-        (q, v), states = course[:2], [course.start]
-        self.start(q, v, course.dt, self.damping)
-        for step in range(1, course.steps + 1):
-            q, v = self.step(course.force(q, v) - self.stiffness * (q[self.at] - self.rest), v)
-            if step % course.every == 0:
-                states.append(np.concatenate([q, v]))
-        return np.array(states), course.steps
+    def springs(self, q: Array) -> Array:
+        return -self.stiffness * (q[self.at] - self.rest)
 
     def fields(self) -> Numbers:
-        speeds = {name: getattr(self, name) for name in SPEEDS}
-        return {"gravity": self.gravity(), **speeds}
+        return {"gravity": self.gravity()} | {name: getattr(self, name) for name in SPEEDS}
 
-    def mend(self, name: str, values: Array) -> bool:
+    def set_field(self, name: str, values: Array) -> bool:
         if name == "gravity":
             self.set_gravity(values)
-        elif name in SPEEDS:
-            setattr(self, name, np.array(values))
-            return not values[self.is_free].any()
-        return name == "gravity"
+            return True
+        setattr(self, name, np.array(values))
+        return not values[self.is_free].any()

@@ -4,9 +4,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .. import Array
-from .model import File, Numbers
+from .model import File
 
 Places = Sequence[int]
 Starts = Mapping[int, tuple[int, int]]
@@ -19,12 +20,13 @@ class Order(NamedTuple):
     turned: tuple[tuple[slice, slice], ...]
     # those speeds are in world axes where the Tree's are in body axes; False: the other way round
     in_world: bool
+    nq: int  # of the Tree
 
     def engine(self, q: Array, *vectors: Array) -> list[Array]:
         """q, and vectors of speeds or forces at q, of the Tree as the engine has them."""
         placed = [vector[self.v] for vector in vectors]
         for at, place in self.turned:
-            turn = rotation(q[place], self.in_world)
+            turn = self.turn(q[place])
             for vector in placed:
                 vector[at] = turn @ vector[at]
         return [q[self.q], *placed]
@@ -34,7 +36,20 @@ class Order(NamedTuple):
         placed = np.empty_like(vector)
         placed[self.v] = vector
         for at, place in self.turned:
-            placed[self.v[at]] = rotation(q[place], not self.in_world) @ vector[at]
+            placed[self.v[at]] = self.turn(q[place]).T @ vector[at]
+        return placed
+
+    def turn(self, quaternion: Array) -> Array:
+        """The rotation (3, 3) from the Tree's axes to the engine's."""
+        turn = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
+        return turn if self.in_world else turn.T
+
+    def positions(self, q: Array) -> Array:
+        """Positions of the engine in the Tree's order, quaternions of length 1."""
+        placed = np.ones(self.nq)
+        placed[self.q] = q
+        for _, place in self.turned:
+            placed[place] /= np.linalg.norm(placed[place])
         return placed
 
     def tree_matrix(self, q: Array, matrix: Array) -> Array:
@@ -43,13 +58,13 @@ class Order(NamedTuple):
 
 def order_of(
     file: File, starts: Starts, free_q: Places, free_v: Places, in_world: bool, ball_q: Places = (0, 1, 2, 3),
-    turned_balls: bool = False,
+    turned_balls: bool = False, turned_at: int = 0,
 ) -> Order:  # fmt: skip
     """The order of an engine.
 
     starts: where the engine's q and v of a joint begin, by its number in the Tree, of a free joint by that of its ball; free_q,
     free_v, ball_q: of a free joint and of a ball, the Tree's numbers in the engine's order; turned_balls: a ball's speeds are
-    in the axes of the body that carries it.
+    in the axes of the body that carries it; turned_at: the first of a free joint's speeds that are in other axes.
     """
     q: dict[int, int] = {}
     v: dict[int, int] = {}
@@ -58,7 +73,7 @@ def order_of(
         joint = file.coordinates.places.joints[k]
         of_q, of_v = np.r_[joint.q], np.r_[joint.qd]
         if file.is_free(k):
-            turned.append((slice(start_v, start_v + 3), joint.q))
+            turned.append((slice(start_v + turned_at, start_v + turned_at + 3), joint.q))
             of_q, of_v = of_q[0] - 3 + np.array(free_q), of_v[0] - 3 + np.array(free_v)
         elif joint.kind == "ball":
             of_q = of_q[list(ball_q)]
@@ -66,26 +81,4 @@ def order_of(
         q |= enumerate(of_q, start_q)
         v |= enumerate(of_v, start_v)
     in_q, in_v = (np.array([place for _, place in sorted(places.items())], int) for places in (q, v))
-    return Order(in_q, in_v, tuple(turned), in_world)
-
-
-def rotation(quaternion: Array, is_forward: bool = True) -> Array:
-    """The matrix of a quaternion w x y z of any length, from body axes to world axes; not is_forward: its inverse."""
-    w, x, y, z = quaternion
-    s, w = 2.0 / (w * w + x * x + y * y + z * z), w if is_forward else -w
-    return np.array([[1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
-                     [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
-                     [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)]])  # fmt: skip
-
-
-def near(read: Array, stated: Array, share: float = 1e-13) -> Array:
-    """Whether numbers that an engine has read are those stated, within a share of the largest, for each joint."""
-    size = np.abs(stated).max(initial=0.0)
-    is_near: Array = (np.abs(read - stated) <= share * size).reshape(len(stated), -1)
-    return np.asarray(is_near.all(axis=1))
-
-
-def wrong_masses(read: Numbers, stated: Numbers, share: float = 1e-13) -> list[int]:
-    """The joints with another mass or other moments. Where only com and inertia differ, bodies are at another place."""
-    are_right = near(read["mass"], stated["mass"], share) & near(read["moments"], stated["moments"], share)
-    return [int(joint) for joint in np.flatnonzero(~are_right)]
+    return Order(in_q, in_v, tuple(turned), in_world, file.coordinates.nq)

@@ -38,14 +38,10 @@ class OwnEquations:
     """
 
     def __init__(
-        self,
-        source: object,
-        coordinates: Coordinates,
-        joints: JointMap | None = None,
-        tree: tmt.Tree | None = None,
+        self, source: object, coordinates: Coordinates, joints: JointMap | None = None, tree: tmt.Tree | None = None,
         required: Sequence[str] = ("mass_matrix", "bias"),
-    ):
-        self.source, self.coordinates, self.tree = source, coordinates, tree
+    ):  # fmt: skip
+        self.coordinates, self.tree = coordinates, tree
         self.functions = functions.functions_of(source, coordinates, required)
         try:
             self.joints = joints or joint_map(coordinates, functions.names_of(source))
@@ -208,8 +204,9 @@ class OwnEquations:
         except BaseException as error:  # whatever a user's own function does
             if is_interrupt(error):
                 raise
-            raised = functions.as_raised(error)
-            raise OwnError(f"{name} raised {raised}{self.hint(name, error)}") from error
+            is_called_otherwise = isinstance(error, TypeError) and "positional argument" in str(error)
+            hint = f"; expected {call(name)}" if is_called_otherwise else ""
+            raise OwnError(f"{name} raised {functions.as_raised(error)}{hint}") from error
         for symbol, before, after in zip(STATE, states, copies):
             if not is_trial:
                 changed = np.any(np.atleast_2d(before != after), axis=1)
@@ -222,14 +219,6 @@ class OwnEquations:
             wanted = f"two arrays, T and B, of shape (bodies, 3, {shape[-1]})"
             raise OwnError(f"jacobians is {shown(value)}; expected {wanted}")
         return np.stack([functions.converted(name, part, of_part) for part in value], axis=-4)
-
-    def hint(self, name: str, error: BaseException) -> str:
-        """What a user may have meant who calls a function with other arguments; "" for any other error."""
-        if isinstance(self.source, type) and isinstance(error, TypeError) and "missing" in str(error):
-            return f"; expected an object, such as {self.source.__name__}(), not the class"
-        if isinstance(error, TypeError) and "positional argument" in str(error):
-            return f"; expected {call(name)}"
-        return ""
 
     def note(self, name: str, what: str, states: States, where: ndarray) -> None:
         """Add an error at those of the states (states, n), in the user's joints, where it occurred."""

@@ -13,7 +13,6 @@ from ...core.check import About
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS
 from ...engines.mujoco import Mujoco
-from ...engines.mujoco.differences import touching
 from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
@@ -21,9 +20,8 @@ from ...engines.outside import OutsideDynamics
 from ...engines.outside.model import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...stability.answer import postures_of
 from ...stability.closed_form import COVERED, matrix
-from ...stability.place import standing_at
+from ...stability.place import postures_of, standing_at
 from ...stability.rest import rest_near
 from .. import Drawing, Experiment
 from ..setup import Setup
@@ -140,8 +138,8 @@ def add_contacts(setup: Setup, result: DerivativesResult) -> None:
 def contact_rows(reading: Reading) -> list[ContactRow]:
     """Differences of the step where the file's first posture sinks to, beside the closed form."""
     posture = postures_of(reading)[0]
-    place = standing_at(reading, posture.name, posture.key)
-    if not place.touching:
+    place = standing_at(reading, posture)
+    if not place.is_touching:
         return []
     integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
     step = Step(place.model, float(place.model.opt.timestep), integrator)
@@ -149,13 +147,13 @@ def contact_rows(reading: Reading) -> list[ContactRow]:
     forces, states = forces_near(step, rest.state), 2 * place.model.nv
     closed = None if forces is None else matrix(rest, place.tree, forces)[:states, :states]
     units = ways.units_of(place.tree, ways.STATE)
-    base = touching(step, rest.state, np.zeros(step.size))
+    base = step.touching(rest.state, np.zeros(step.size))
     rows = []
     for eps in ways.SIZES:
         changed: set[str] = set()
         for nudge in eps * np.eye(step.size):
             for by in (nudge, -nudge):
-                changed |= base ^ touching(step, rest.state, by)
+                changed |= base ^ step.touching(rest.state, by)
         A, difference = step.derivative(rest.state, eps)[:states, :states], None
         if closed is not None:
             error, *_ = ways.relative(A - closed, closed, (units, units))

@@ -39,31 +39,28 @@ from .tables import EngineRow, EnginesResult, ReadRow
 EXPERIMENT = Experiment(order=65, serves_own=False, quick_speeds=0, options=("--engines",))
 BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
+TABLES = "answer", "read", "methods", "servos", "batches"
 SHOWN = ["engine", "quantity", "unit", "states", "as_read_over_bar", "worst_difference", "bar", "difference_over_bar",
          "difference_eps", "mujoco_eps"]  # fmt: skip
-NOT_ASKED = {
-    Unread: "unread",
-    OtherJoints: "other_joints",
-    OtherNames: "other_names",
-    Unasked: "unasked",
-    Unwritten: "unwritten",
-    TooLong: "too_long",
-}
+NOT_ASKED = (
+    Unread,
+    OtherJoints,
+    OtherNames,
+    Unasked,
+    Unwritten,
+    TooLong,
+)  # their names are kinds in the template
 
 
 def skipped(robot: Robot) -> Finding | None:
     engines = [Outside(name) for name, record in RECORDS.items() if record.reads_file]
-    if any(not engine.unavailable() for engine in engines):
-        return None
-    return Finding("engines", "none_installed", {"extras": [engine.record.extra for engine in engines]})
+    extras = [engine.record.extra for engine in engines if engine.unavailable()]
+    return Finding("engines", "none_installed", {"extras": extras}) if len(extras) == len(engines) else None
 
 
 def rows(setup: Setup) -> EnginesResult:
     """What each installed engine has read, its M, h and accelerations, its integrators, servos and batches."""
-    tables = dict[str, Any](
-        engines_answer=[], engines_read=[], engines_methods=[], engines_servos=[], engines_batches=[]
-    )
-    result = EnginesResult("engines", shown=SHOWN, tables=tables)
+    result = EnginesResult("engines", shown=SHOWN, tables={f"engines_{name}": [] for name in TABLES})
     absent: dict[str, list[str]] = {}
     for engine in [engine for engine in setup.engines.values() if isinstance(engine, Outside)]:
         label = LABELS[engine.name]
@@ -72,14 +69,14 @@ def rows(setup: Setup) -> EnginesResult:
                 absent.setdefault(reason, []).append(label)
             else:
                 compare_engine(result, setup, engine)
-        except (*NOT_ASKED,) as error:
+        except NOT_ASKED as error:
             add_not_asked(result, label, error)
         except EngineError as error:
             result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
     for reason, labels in absent.items():
         result.find("absent", engines=labels, reason=reason)
-    for label in result.by_urdf:
-        result.find("urdf", engine=label, numbers=result.unwritten[label])
+    for label in result.labels(FROM_URDF):
+        result.find("urdf", engine=label, numbers=list(result.readers[label].unwritten))
     if result.rows:
         integrators.follow_known(result, setup)
         for known in (setup.engines["mujoco"], setup.engines["tmt"]):
@@ -101,7 +98,8 @@ def add_load(result: EnginesResult) -> None:
 def add_not_asked(result: EnginesResult, label: str, error: EngineError) -> None:
     """A row and a finding of an engine that takes no part: it refuses the file, or this program does not ask it."""
     result.tables["engines_read"].append(ReadRow(label, why_not=str(error)))
-    result.find(NOT_ASKED[type(error)], engine=label, reason=str(error).rstrip("."))
+    reason = str(error).rstrip(".")
+    result.find("not_asked", why=type(error).__name__, engine=label, reason=reason)
     if label not in [row.engine for row in result.rows]:
         result.not_asked.append(label)
 
@@ -110,14 +108,13 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     setup.progress(f"engines: {engine.record.label}{' compiles' * engine.record.compiles}")
     dynamics = engine.of(setup.robot.case())
     reading = dynamics.reading
-    result.unwritten[engine.record.label] = list(reading["unwritten"])
     compare_numbers(result, setup.robot, engine.record, reading)
     reads_another = bool(reading["mended"] or reading["lacking"]) and reading["way"] != FROM_URDF
     as_read = engine.as_read(setup.robot.case()) if reads_another else None
     compare_quantities(result, setup, engine.record, dynamics, as_read)
     if all(reading["mended"].values()):
         integrators.compare_methods(result, setup, engine)
-        servos.follow_step(result, setup, engine)
+        servos.follow_step(result, setup, engine, reads_another)
         batches.time_batches(result, setup, engine)
 
 
@@ -132,44 +129,36 @@ def compare_quantities(
         if not dynamics.has(function):
             result.find("no_function", engine=record.label, quantity=name)
             continue
+        several = {"set": dynamics, "read": as_read or dynamics, "mujoco": mujoco}
         states = QUANTITIES[name].states(sample)
-        values, by_mujoco = (getattr(of, function)(*states) for of in (dynamics, mujoco))
-        row = compare_quantity(result, sample, record, name, values, by_mujoco)
-        row.as_read_over_bar = row.difference_over_bar
-        if as_read is not None:
-            shares = shares_of(sample, record, name, getattr(as_read, function)(*states))
-            row.as_read_over_bar = float(shares.max())
-
-
-def shares_of(sample: Sample, record: EngineRecord, name: str, values: np.ndarray) -> np.ndarray:
-    """The distance of values of a quantity from the exact ones, over their tolerance."""
-    quantity, scale = QUANTITIES[name], Entries(sample.tree, sample.q, sample.qd)
-    exact = quantity.exact(sample)
-    size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values.shape)
-    return np.asarray(over(exact.distance(values), FACTOR * record.eps * size))
+        values = {which: getattr(asked, function)(*states) for which, asked in several.items()}
+        compare_quantity(result, sample, record, name, values)
 
 
 def compare_quantity(
-    result: Result, sample: Sample, record: EngineRecord, name: str, values: np.ndarray, by_mujoco: np.ndarray
-) -> EngineRow:
-    """A check of the entry that is closest to its tolerance, and a row."""
+    result: Result, sample: Sample, record: EngineRecord, name: str, values: dict[str, np.ndarray]
+) -> None:
+    """A check of the entry that is closest to its tolerance, and a row. values: with the numbers set, as read, MuJoCo's."""
     quantity, scale, eps = QUANTITIES[name], Entries(sample.tree, sample.q, sample.qd), record.eps
     exact = quantity.exact(sample)
-    size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values.shape)
-    difference, tolerance = exact.distance(values), FACTOR * eps * size
-    worst = closest(difference, tolerance)
+    size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values["set"].shape)
+    distances, tolerance = (
+        {which: exact.distance(array) for which, array in values.items()},
+        FACTOR * eps * size,
+    )
+    worst = closest(distances["set"], tolerance)
     numbers = {name: [repr(float(x)) for x in getattr(sample, name)[worst[0]]] for name in ("q", "qd", "tau")}
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
-    units, pair = quantity.unit(sample.tree), (difference[worst], tolerance[worst])
-    check = result.check(record.label, f"{name} to exact", *pair, units, note, True, about=About.ENGINE)
-    about = record.label, record.precision, name, units, len(sample.q), None
-    row = EngineRow(*about, check.value, check.tolerance)
-    row.difference_over_bar, row.passed = check.over_tolerance, check.passed
-    row.difference_eps = float(over(difference, eps * size).max())
-    row.mujoco_eps = float(over(exact.distance(by_mujoco), EPS * size).max())
-    row.worst_q, row.worst_qd, row.worst_tau = (" ".join(of_state) for of_state in numbers.values())
-    result.rows.append(row)
-    return row
+    unit, pair = quantity.unit(sample.tree), (distances["set"][worst], tolerance[worst])
+    check = result.check(record.label, f"{name} to exact", *pair, unit, note, True, about=About.ENGINE)
+    state = {f"worst_{name}": " ".join(of_state) for name, of_state in numbers.items()}
+    result.rows.append(EngineRow(
+        engine=record.label, precision=record.precision, quantity=name, unit=unit, states=len(sample.q),
+        as_read_over_bar=float(over(distances["read"], tolerance).max()), worst_difference=check.value,
+        bar=check.tolerance, difference_over_bar=check.over_tolerance,
+        difference_eps=float(over(distances["set"], eps * size).max()),
+        mujoco_eps=float(over(distances["mujoco"], EPS * size).max()), **state, passed=check.passed,
+    ))  # fmt: skip
 
 
 def asked_at(setup: Setup, precision: str) -> Sample:
@@ -181,13 +170,11 @@ def asked_at(setup: Setup, precision: str) -> Sample:
 
 
 def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:
-    from . import figures_engines  # matplotlib is for the process that draws
+    from . import figures_engines as drawn  # matplotlib is for the process that draws
 
-    if result.rows:
-        yield partial(figures_engines.draw_distances, result)
-    if any(row.worst_error for row in result.tables["engines_methods"]):
-        yield partial(figures_engines.draw_errors, result)
-    if result.tables["engines_servos"]:
-        yield partial(figures_engines.draw_servos, result)
-    if result.tables["engines_batches"]:
-        yield partial(figures_engines.draw_batches, result)
+    has_errors = any(row.worst_error for row in result.tables["engines_methods"])
+    drawings = {
+        drawn.draw_distances: result.rows, drawn.draw_errors: has_errors,
+        drawn.draw_servos: result.tables["engines_servos"], drawn.draw_batches: result.tables["engines_batches"],
+    }  # fmt: skip
+    yield from (partial(draw, result) for draw, is_drawn in drawings.items() if is_drawn)

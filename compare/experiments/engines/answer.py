@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...engines import LABELS
+from ...engines.outside.model import FROM_COMPILED, FROM_URDF
 from ...judge.run import movement_unit
 from ...robots.case import Case
 from .tables import AnswerRow, EnginesResult, MethodRow
@@ -14,55 +15,49 @@ SAME, OTHER, NOT_SET = "same", "differs", "not set"  # verdicts on the equations
 
 def add_answer(result: EnginesResult, case: Case | None) -> None:
     """The rows of all engines, the headline and the sentences of the first screen."""
-    labels = [*dict.fromkeys(row.engine for row in result.rows)]
-    verdicts = {label: as_read(result, label) for label in labels}
-    sets = {label: as_set(result, label) for label in labels}
-    precisions = {row.engine: row.precision for row in result.rows}
     runs: dict[str, list[MethodRow]] = {}
-    for row in result.tables["engines_methods"]:
-        runs.setdefault(row.engine, []).append(row)
+    for run in result.tables["engines_methods"]:
+        runs.setdefault(run.engine, []).append(run)
+    precisions = {row.engine: row.precision for row in result.rows}
     known = [label for label in (LABELS["mujoco"], LABELS["tmt"]) if label in runs]
-    for label in [*known, *labels]:
-        of_label: dict[str, Any] = {"engine": label, "precision": precisions.get(label, "float64")}
-        of_label |= {"as_read": verdicts.get(label, SAME), "as_set": sets.get(label, SAME)}
-        of_runs = cheapest_of(runs.get(label, []), case.duration if case else 1.0)
-        result.tables["engines_answer"].append(AnswerRow(**of_label, **of_runs))
-    values: dict[str, Any] = {"as_read": verdicts, "as_set": sets, "not_asked": result.not_asked}
-    values |= {"by_urdf": result.by_urdf, "by_compiled": result.by_compiled}
+    rows = [
+        AnswerRow(
+            engine=label, precision=precisions.get(label, "float64"), as_read=as_read(result, label),
+            as_set=as_set(result, label), **cheapest_of(runs.get(label, []), case.duration if case else 1.0),
+        )
+        for label in (*known, *precisions)
+    ]  # fmt: skip
+    result.tables["engines_answer"] += rows
+    ways = {"by_urdf": result.labels(FROM_URDF), "by_compiled": result.labels(FROM_COMPILED)}
+    values: dict[str, Any] = {"rows": rows[len(known) :], "not_asked": result.not_asked, **ways}
     result.headline = result.finding("headline", **values)
-    result.top.append(result.finding("answer", **values, set_here=result.mended))
-    if case and result.tables["engines_methods"]:
-        rows = result.tables["engines_answer"]
+    result.top.append(result.finding("answer", **values))
+    if case and runs:
         cheapest = {name: cheapest_engine(rows, name) for name in TARGETS}
+        unit = movement_unit(case.coordinates)
         about: dict[str, Any] = {
             "scene": case.name,
             "duration": case.duration,
-            "unit": movement_unit(case.coordinates),
+            "unit": unit,
+            "targets": TARGETS,
         }
-        result.top.append(result.finding("cheapest", cheapest=cheapest, targets=TARGETS, **about))
+        result.top.append(result.finding("cheapest", cheapest=cheapest, **about))
         result.top += [result.finding("engine", row=row, targets=TARGETS) for row in rows]
 
 
 def as_read(result: EnginesResult, label: str) -> str:
     """What a user gets who loads the file: same, or what differs."""
-    differing = result.otherwise.get(label, [])
-    rows = [row for row in result.rows if row.engine == label]
-    shares = [row.as_read_over_bar for row in rows if row.as_read_over_bar is not None]
-    if differing:
-        return ", ".join(differing)
-    return SAME if all(share <= 1.0 for share in shares) else OTHER
+    if label in result.readers and result.readers[label].differing:
+        return ", ".join(result.readers[label].differing)
+    return SAME if all(row.as_read_over_bar <= 1.0 for row in result.rows if row.engine == label) else OTHER
 
 
 def as_set(result: EnginesResult, label: str) -> str:
     """Whether the equations are the same with the numbers that this program could set."""
     if all(row.passed for row in result.rows if row.engine == label):
         return SAME
-    numbers = {
-        row.number
-        for row in result.tables["engines_read"]
-        if row.engine == label and not row.set_by_this_program
-    }
-    return NOT_SET if numbers else OTHER
+    read = [row for row in result.tables["engines_read"] if row.engine == label]
+    return NOT_SET if any(not row.set_by_this_program for row in read) else OTHER
 
 
 def cheapest_of(runs: Sequence[MethodRow], duration: float) -> Mapping[str, Any]:

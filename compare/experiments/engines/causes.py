@@ -31,17 +31,16 @@ class Cause(NamedTuple):
 
 
 class Text:
-    """An MJCF file as text: elements by their names, and the classes of defaults."""
+    """An MJCF file as text: elements by their names, the classes of defaults; and its compiled model."""
 
     def __init__(self, path: Path) -> None:
         self.model = Source(path).model
         self.root = ElementTree.Element("mujoco")
         if path.suffix != ".urdf":
             self.root = included(ElementTree.parse(path).getroot(), path.parent)
+        outermost = next((default.get("class", "main") for default in self.root.findall("default")), "main")
         self.classes: dict[str, tuple[ElementTree.Element, str | None]] = {}  # with the class around
-        outermost = "main"
         for default in self.root.findall("default"):
-            outermost = default.get("class", "main")
             self.add_class(default, outermost, None)
         self.class_of: dict[str, str] = {}  # of joints, by name
         for world in self.root.findall("worldbody"):
@@ -74,35 +73,18 @@ class Text:
 
     def carriers(self, name: str, is_joint: bool) -> list[int]:
         """The bodies from the one of a name, or that of a joint of that name, to the last one before the world."""
-        bodies = [self.model.body(k).name for k in range(self.model.nbody)]
-        joints = [self.model.joint(k).name for k in range(self.model.njnt)]
-        if is_joint and name in joints:
-            body = int(self.model.jnt_bodyid[joints.index(name)])
-        else:
-            body = bodies.index(name) if name in bodies else 0
+        bodies = {self.model.body(k).name: k for k in range(self.model.nbody)}
+        joints = {self.model.joint(k).name: int(self.model.jnt_bodyid[k]) for k in range(self.model.njnt)}
+        body = joints[name] if is_joint and name in joints else bodies.get(name, 0)
         carriers = []
         while body:
             carriers.append(body)
             body = int(self.model.body_parentid[body])
         return carriers
 
-    def turn_of_body(self, joint: str) -> np.ndarray:
-        """The rotation of the body of a joint at qpos0, from its axes to those of the world."""
-        turn = Rotation.identity()
-        for body in self.carriers(joint, True):
-            turn = Rotation.from_quat(np.roll(self.model.body_quat[body], -1)) * turn
-        return turn.as_matrix()
-
-    def has_mass_of_geoms(self, name: str) -> bool:
-        element = self.root.find(f".//body[@name='{name}']")
-        return element is not None and element.find("inertial") is None and element.find("geom") is not None
-
-    def geoms(self, name: str, attribute: str) -> list[ElementTree.Element]:
-        """The geoms of a body that have an attribute."""
-        return self.root.findall(f".//body[@name='{name}']/geom[@{attribute}]")
-
-    def compiler(self, attribute: str) -> bool:
-        return any(attribute in compiler.attrib for compiler in self.root.findall("compiler"))
+    def turn(self, body: int) -> Rotation:
+        """From the axes of a body to those of its parent, at qpos0."""
+        return Rotation.from_quat(np.roll(self.model.body_quat[body], -1))
 
 
 class Entry(NamedTuple):
@@ -120,24 +102,37 @@ class Entry(NamedTuple):
         """What was read, and what is stated."""
         return self.reading["read"][number], self.reading["stated"][number]
 
+    @property
+    def is_zero(self) -> bool:
+        return not self.values(self.number)[0][self.place]
+
     def carriers(self, name: str) -> list[int]:
         """The bodies from that of a name among the entries to the last one before the world."""
         return self.text.carriers(name, self.number.startswith(("axis", "anchor")))
 
     @property
     def root(self) -> int:
-        """The last body before the world; 0: none."""
-        return next(reversed(self.carriers(self.name)), 0)
+        """The last body before the world, for an entry of a place; 0: none."""
+        return next(reversed(self.carriers(self.name)), 0) if self.number in PLACES else 0
+
+    @property
+    def geoms(self) -> list[ElementTree.Element]:
+        """The geoms of which the body has its mass, for an entry of masses."""
+        body = self.text.root.find(f".//body[@name='{self.name}']")
+        if self.number not in MASSES or body is None or body.find("inertial") is not None:
+            return []
+        return body.findall("geom")
 
 
 def class_without_joint(entry: Entry) -> str | None:
     """A class between has no <joint>, and the engine has MJCF's default: 0, and an axis along z of the body."""
     name = entry.text.passed_over(entry.name, entry.number) if entry.number in OF_JOINTS else None
-    read = entry.values(entry.number)[0]
     if name and entry.number == "axis":
-        z = entry.text.turn_of_body(entry.name) @ (0.0, 0.0, 1.0)
-        return name if np.allclose(read[entry.joint], z, atol=1e-6) else None
-    return name if name and not read[entry.place] else None
+        z = np.array([0.0, 0.0, 1.0])
+        for body in entry.carriers(entry.name):
+            z = entry.text.turn(body).apply(z)
+        return name if np.allclose(entry.values("axis")[0][entry.joint], z, atol=1e-6) else None
+    return name if name and entry.is_zero else None
 
 
 def no_springs(entry: Entry) -> str | None:
@@ -147,10 +142,10 @@ def no_springs(entry: Entry) -> str | None:
 
 def armature_without_motor(entry: Entry) -> str | None:
     """The engine has the armature of all joints that a motor or a position servo drives, and of no other."""
-    is_zero = entry.number == "armature" and not entry.values("armature")[0][entry.place]
     driven = entry.wrong & entry.text.driven
     unexplained = [name for name in driven if not entry.text.passed_over(name, "armature")]
-    return entry.name if is_zero and entry.name not in driven and not unexplained else None
+    is_lost = entry.number == "armature" and entry.is_zero and entry.name not in driven
+    return entry.name if is_lost and not unexplained else None
 
 
 def option_gravity(entry: Entry) -> str | None:
@@ -160,7 +155,7 @@ def option_gravity(entry: Entry) -> str | None:
 
 def total_mass(entry: Entry) -> str | None:
     """All masses are the same multiple of the compiled ones."""
-    if entry.number not in MASSES or not entry.text.compiler("settotalmass"):
+    if entry.number not in MASSES or entry.text.root.find("compiler[@settotalmass]") is None:
         return None
     read, stated = entry.values("mass")
     ratios = read[stated > 0.0] / stated[stated > 0.0]
@@ -168,17 +163,12 @@ def total_mass(entry: Entry) -> str | None:
 
 
 def mass_of_meshes(entry: Entry) -> str | None:
-    is_of_geoms = entry.number in MASSES and entry.text.has_mass_of_geoms(entry.name)
-    return entry.name if is_of_geoms and entry.text.geoms(entry.name, "mesh") else None
-
-
-def mass_of_geoms(entry: Entry) -> str | None:
-    return entry.name if entry.number in MASSES and entry.text.has_mass_of_geoms(entry.name) else None
+    return entry.name if any("mesh" in geom.attrib for geom in entry.geoms) else None
 
 
 def mass_without_contacts(entry: Entry) -> str | None:
     """The geoms of a body without an inertial do not collide, and the engine has less mass."""
-    if entry.number not in MASSES or not entry.text.has_mass_of_geoms(entry.name):
+    if not entry.geoms:
         return None
     model, (read, stated) = entry.text.model, entry.values("mass")
     geoms = model.geom_bodyid == model.body(entry.name).id
@@ -195,38 +185,41 @@ def small_inertia(entry: Entry) -> str | None:
     return entry.name if (read >= stated * (1.0 - 1e-5)).all() else None
 
 
-def several_joints(entry: Entry) -> str | None:
-    """All that is at another place is carried by a body with several joints."""
-    counts = entry.text.model.body_jntnum
-    several = [[body for body in entry.carriers(name) if counts[body] > 1] for name in entry.wrong]
-    if entry.number not in PLACES or not all(several):
-        return None
-    body = next(body for body in entry.carriers(entry.name) if counts[body] > 1)
-    return str(entry.text.model.body(body).name)
+def mass_of_geoms(entry: Entry) -> str | None:
+    return entry.name if entry.geoms else None
 
 
 def fixed_root(entry: Entry) -> str | None:
     """Without the pose of a body on the world that has no joint, all is where the engine has it."""
     model, root = entry.text.model, entry.root
-    has_pose = (model.body_pos[root].any() or model.body_quat[root][1:].any()) and not model.body_jntnum[root]
-    if entry.number not in PLACES or not (root and has_pose):
+    has_pose = model.body_pos[root].any() or model.body_quat[root][1:].any()
+    if not root or model.body_jntnum[root] or not has_pose:
         return None
-    turn = Rotation.from_quat(np.roll(model.body_quat[root], -1))
     read, stated = entry.values("com")
-    is_so = np.allclose(turn.apply(read[entry.joint]) + model.body_pos[root], stated[entry.joint], atol=1e-6)
-    return str(model.body(root).name) if is_so else None
+    placed = entry.text.turn(root).apply(read[entry.joint]) + model.body_pos[root]
+    return str(model.body(root).name) if np.allclose(placed, stated[entry.joint], atol=1e-6) else None
 
 
 def turned_start(entry: Entry) -> str | None:
     """Positions of a free body are turned about the place that the file gives it, by the turn that it has there."""
     model, root = entry.text.model, entry.root
-    if entry.number not in PLACES or not root or model.body_dofnum[root] != 6:
+    if not root or model.body_dofnum[root] != 6:
         return None
-    turn = Rotation.from_quat(np.roll(model.body_quat[root], -1))
     read, stated = entry.values("com")
-    moved = model.body_pos[root] - turn.apply(model.body_pos[root])
+    moved = model.body_pos[root] - entry.text.turn(root).apply(model.body_pos[root])
     is_so = moved.any() and np.allclose(stated[entry.joint] + moved, read[entry.joint], atol=1e-6)
     return str(model.body(root).name) if is_so else None
+
+
+def several_joints(entry: Entry) -> str | None:
+    """All that is at another place is carried by a body with several joints."""
+    model = entry.text.model
+    several = {
+        name: [body for body in entry.carriers(name) if model.body_jntnum[body] > 1] for name in entry.wrong
+    }
+    if entry.number not in PLACES or not all(several.values()):
+        return None
+    return str(model.body(several[entry.name][0]).name)
 
 
 CAUSES: tuple[Callable[[Entry], str | None], ...] = (

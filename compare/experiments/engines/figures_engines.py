@@ -1,5 +1,6 @@
 """Figures of other engines: distances from the exact values; errors, times, responses of servos, batches."""
 
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -16,23 +17,8 @@ from ...report.style import RED, WIDTH
 from .tables import EnginesResult
 
 DASHES = (*style.DASHES, (0, (1, 3)), (0, (8, 2)), (0, (6, 1, 1, 1, 1, 1)))
-OF_METHODS = (
-    "o",
-    "s",
-    "^",
-    "D",
-    "v",
-    "P",
-    "X",
-    "<",
-    ">",
-    "*",
-    "h",
-    "p",
-)  # markers of the methods of one engine
-LOOKS: dict[str, dict[str, Any]] = {
-    LABELS[name]: {"marker": MARKS[name], "color": COLOURS[name]} for name in LABELS
-}
+OF_METHODS = "os^DvPX<>*hp"  # markers of the methods of one engine
+LOOKS: dict[str, Any] = {LABELS[name]: {"marker": MARKS[name], "color": COLOURS[name]} for name in LABELS}
 
 
 def draw_distances(result: Result) -> tuple[str, Figure, Finding]:
@@ -64,27 +50,20 @@ def draw_errors(result: Result) -> tuple[str, Figure, Finding]:
     by_step, by_time = fig.subplots(1, 2)
     for engine in dict.fromkeys(row.engine for row in rows):
         methods = dict.fromkeys(row.method for row in rows if row.engine == engine)
-        for k, method in enumerate(methods):
+        for method, marker, dashes in zip(methods, cycle(OF_METHODS), cycle(DASHES)):
+            look = {"marker": marker, "markersize": 5, "linewidth": 1, "color": LOOKS[engine]["color"]}
             runs = [row for row in rows if (row.engine, row.method) == (engine, method)]
-            look = {
-                "markersize": 5,
-                "linestyle": DASHES[k % len(DASHES)],
-                "linewidth": 1,
-                "color": LOOKS[engine]["color"],
-            }
-            look["marker"] = OF_METHODS[k % len(OF_METHODS)]
-            errors, times = [row.worst_error for row in runs], [1e3 * row.own_seconds for row in runs]
+            steps, errors, times = zip(*((row.dt, row.worst_error, 1e3 * row.own_seconds) for row in runs))
             if runs[0].dt:
-                by_step.plot([1e3 * row.dt for row in runs], errors, **look)
-            by_time.plot(errors, times, label=f"{engine} {method}", **look)
-            unsteady = [(row.worst_error, 1e3 * row.own_seconds) for row in runs if not row.steady]
-            hollow = {**look, "linestyle": "none", "markerfacecolor": "white"}
-            by_time.plot(*zip(*unsteady), **hollow) if unsteady else None
+                by_step.plot(1e3 * np.array(steps), errors, linestyle=dashes, **look)
+            by_time.plot(errors, times, linestyle=dashes, label=f"{engine} {method}", **look)
+            unsteady = [k for k, row in enumerate(runs) if not row.steady]
+            hollow = [np.take(values, unsteady) for values in (errors, times)]
+            by_time.plot(*hollow, linestyle="none", markerfacecolor="white", **look)
     error = "largest error over the scene, rad"
     by_step.set(xscale="log", yscale="log", xlabel="dt, ms", ylabel=error)
-    by_time.set(
-        xscale="log", yscale="log", xlabel=f"{error} (decreasing)", ylabel="time of the engine's steps, ms"
-    )
+    time = "time of the engine's steps, ms"
+    by_time.set(xscale="log", yscale="log", xlabel=f"{error} (decreasing)", ylabel=time)
     for axis in (by_step.xaxis, by_step.yaxis, by_time.xaxis, by_time.yaxis):
         few_ticks(axis)
     by_time.invert_xaxis()
@@ -107,15 +86,10 @@ def draw_servos(result: EnginesResult) -> tuple[str, Figure, Finding]:
     """The largest deviation of each method from the exact response, against time."""
     fig = Figure(figsize=(WIDTH, 4.0), layout="constrained")
     ax, rows = fig.subplots(), result.tables["engines_servos"]
-    for k, (label, (t, deviation)) in enumerate(result.responses.items()):
-        engine = next(row.engine for row in rows if row.label == label)
-        ax.plot(
-            t[1:],
-            np.abs(deviation[1:]).max(axis=1),
-            label=label,
-            color=LOOKS[engine]["color"],
-            linestyle=DASHES[k % len(DASHES)],
-        )
+    engines = {row.label: row.engine for row in rows}
+    for (label, (t, deviation)), dashes in zip(result.responses.items(), cycle(DASHES)):
+        largest, colour = np.abs(deviation[1:]).max(axis=1), LOOKS[engines[label]]["color"]
+        ax.plot(t[1:], largest, label=label, color=colour, linestyle=dashes)
     ax.set(yscale="log", xlabel="t, s", ylabel="distance from the exact response, rad")
     few_ticks(ax.yaxis)
     fig.legend(loc="outside upper center", ncols=4, fontsize=7)
@@ -129,12 +103,8 @@ def draw_batches(result: EnginesResult) -> tuple[str, Figure, Finding]:
     for engine in dict.fromkeys(row.engine for row in rows):
         of_engine = [row for row in rows if row.engine == engine]
         costs = [row.per_step_and_world for row in of_engine]
-        ax.plot(
-            [row.worlds for row in of_engine],
-            costs,
-            label=f"{engine}, {of_engine[0].device}",
-            **LOOKS[engine],
-        )
+        worlds, label = [row.worlds for row in of_engine], f"{engine}, {of_engine[0].device}"
+        ax.plot(worlds, costs, label=label, **LOOKS[engine])
     ax.set(xscale="log", yscale="log", xlabel="worlds", ylabel="time of a step and world, us")
     few_ticks(ax.yaxis)
     fig.legend(loc="outside upper center", ncols=3, fontsize=7)

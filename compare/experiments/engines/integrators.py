@@ -97,22 +97,15 @@ def add_runs(
     for setting in settings:
         dynamics = engine.of(case)
         run = follow(dynamics, case, method, setting, reference(case), rounds=ROUNDS)
+        ended = run.motion.ended
         row = MethodRow(
-            scene=case.name,
-            engine=LABELS[engine.name],
-            method=method.name,
-            scheme=method.scheme,
-            dt=case.duration / setting.steps if setting.steps else None,
-            tolerance=setting.tolerance,
-            worst_error=None if run.motion.ended else float(run.error.max()),
-            seconds=run.seconds,
-            seconds_alone=run.motion.seconds_alone,
-            scatter=run.scatter,
-            steady=run.scatter <= timing.STEADY,
+            scene=case.name, engine=LABELS[engine.name], method=method.name, scheme=method.scheme,
+            dt=case.duration / setting.steps if setting.steps else None, tolerance=setting.tolerance,
+            worst_error=None if ended else float(run.error.max()), seconds=run.seconds,
+            seconds_alone=run.motion.seconds_alone, scatter=run.scatter, steady=run.scatter <= timing.STEADY,
             seconds_prepared=getattr(dynamics, "seconds_prepared", None),
-            ended=None if run.motion.ended is None else str(run.motion.ended),
-            order=method.order,
-        )
+            ended=None if ended is None else str(ended), order=method.order,
+        )  # fmt: skip
         rows.append(row)
         if row.dt and not row.ended:
             steps.append(row.dt)

@@ -7,11 +7,11 @@ import numpy as np
 from ...core.check import About
 from ...core.words import some_of
 from ...engines import EngineRecord
-from ...engines.outside.model import FROM_COMPILED, FROM_URDF, OtherNames, Reading, size_of
+from ...engines.outside.model import OtherNames, Reading, size_of
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from .causes import Cause, Entry, Text, cause_of
-from .tables import EnginesResult, ReadRow
+from .tables import EnginesResult, ReadRow, Share
 
 UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2", "axis": "", "anchor": "m",
          "armature": "kg m2", "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
@@ -29,32 +29,23 @@ AS_READ = "as read"  # checks of numbers
 
 def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
     """Rows of what the engine has read differently, and checks of the masses and moments of inertia."""
-    label = record.label
+    label, lacking, mended = record.label, list(reading["lacking"]), reading["mended"]
+    share = result.readers[label] = Share(reading["way"], reading["unwritten"])
     if reading["copied"]:
         kind, message = reading["copied"]
         result.find("copied", engine=label, error=kind, reason=message.rstrip("."))
-        result.otherwise[label] = [REFUSED] if kind != OtherNames.__name__ else []
-    if reading["way"] == FROM_URDF:
-        result.by_urdf.append(label)
-    if reading["way"] == FROM_COMPILED:
-        result.by_compiled.append(label)
-    if reading["lacking"]:
-        result.find("lacking", engine=label, numbers=list(reading["lacking"]))
-        result.otherwise.setdefault(label, []).extend(f"no {number}" for number in reading["lacking"])
+        share.differing += [REFUSED] if kind != OtherNames.__name__ else []
+    if lacking:
+        result.find("lacking", engine=label, numbers=lacking)
+        share.differing += [f"no {number}" for number in lacking]
     for number in reading["read"]:
         if number in OF_BODIES:
-            what, most = f"{number} {AS_READ}", largest_difference(reading, number)
-            tolerance = tolerance_of(reading, record, number)
-            result.check(label, what, most, tolerance, UNITS[number], "", True, about=About.ENGINE)
-        is_said = number in reading["lacking"] or any(
-            cause in reading["mended"] for cause in FOLLOWS.get(number, ())
-        )
-        if number in reading["mended"] and not is_said:
+            most = np.abs(reading["read"][number] - reading["stated"][number]).max(initial=0.0)
+            pair = float(most), tolerance_of(reading, record, number)
+            result.check(label, f"{number} {AS_READ}", *pair, UNITS[number], "", True, about=About.ENGINE)
+        follows = any(cause in mended for cause in FOLLOWS.get(number, ()))
+        if number in mended and number not in lacking and not follows:
             add_differing(result, robot, record, reading, number)
-
-
-def largest_difference(reading: Reading, number: str) -> float:
-    return float(np.abs(reading["read"][number] - reading["stated"][number]).max(initial=0.0))
 
 
 def tolerance_of(reading: Reading, record: EngineRecord, number: str) -> float:
@@ -83,10 +74,8 @@ def add_differing(
     result.find("read_differently", engine=label, rows=rows, number=number, mended=is_set, count=len(wrong))
     for cause in causes:
         result.find("cause", engine=label, cause=cause, number=quantity)
-    what = result.otherwise.setdefault(label, [])
-    what += [] if quantity in what else [quantity]
-    if is_set:
-        result.mended.setdefault(label, []).append(number)
+    differing = result.readers[label].differing
+    differing += [] if quantity in differing else [quantity]
 
 
 def named_after(robot: Robot, number: str) -> tuple[list[str], list[int]]:

@@ -7,7 +7,8 @@ import numpy as np
 
 import tmt
 
-from ...engines import GRID, LABELS, RECORDS, Array, Engine, Method, Setting
+from ...engines import GRID, LABELS, RECORDS, Array, Dynamics, Engine, Method, Setting
+from ...engines.outside import Outside
 from ...engines.outside.model import EngineError
 from ...judge.run import diverged_at
 from ...judge.scale import FACTOR
@@ -39,8 +40,8 @@ def scene_of(setup: Setup) -> Case | None:
     return brief(next(iter(cases), None))
 
 
-def follow_step(result: EnginesResult, setup: Setup, engine: Engine) -> None:
-    """Rows of the methods of an engine at the file's own step."""
+def follow_step(result: EnginesResult, setup: Setup, engine: Engine, reads_another: bool = False) -> None:
+    """Rows of the methods of an engine at the file's own step; reads_another: with the numbers that it has read, too."""
     case = scene_of(setup)
     if case is None or engine.name == "tmt":  # it explains the others
         return
@@ -49,7 +50,9 @@ def follow_step(result: EnginesResult, setup: Setup, engine: Engine) -> None:
     for method in [known[name] for name in names if name in known and not known[name].adaptive]:
         setup.progress(f"engines: servos, {method.label}")
         try:
-            add_response(result, setup, case, engine, method)
+            row = add_response(result, setup, case, engine, method)
+            if reads_another and isinstance(engine, Outside):
+                add_as_read(result, case, engine.as_read(case), method, row)
         except EngineError as error:
             result.find("left_out", what=f"{method.label}, servos", reason=str(error).rstrip("."))
             return
@@ -64,26 +67,40 @@ def add_sentences(result: EnginesResult) -> None:
         result.find("response", why=why, rows=of_why)
 
 
-def add_response(result: EnginesResult, setup: Setup, case: Case, engine: Engine, method: Method) -> None:
+def add_response(result: EnginesResult, setup: Setup, case: Case, engine: Engine, method: Method) -> ServoRow:
     steps = steps_of(setup, case)
-    exact, setting = reference(case), Setting(case.duration, steps)
-    run = follow(engine.of(case), case, method, setting, exact)
-    q = run.motion.q
-    ended = run.motion.ended or diverged_at(case, exact.t, q, run.motion.v)
     how = HOW.get(engine.name) or HOW.get(f"{engine.name} {method.name}", HELD)
     row = ServoRow(
-        scene=case.name, engine=LABELS[engine.name], method=method.name, servo=how, dt=case.duration / steps,
-        deviation=float(run.error.max()),
-    )  # fmt: skip
-    if ended:
-        row.deviation, row.ended = None, str(ended)
-    if not ended and row.deviation and row.deviation > LARGE:
-        row.why, row.unexplained = explanation(case, engine, method, steps, q)
-    result.tables["engines_servos"].append(row)
-    result.responses[row.label] = (
-        exact.t,
-        case.coordinates.difference(q, exact.high[:, : case.coordinates.nq]),
+        scene=case.name, engine=LABELS[engine.name], method=method.name, servo=how, dt=case.duration / steps
     )
+    q = follow_row(result, case, engine.of(case), method, row)
+    if row.deviation and row.deviation > LARGE:
+        row.why, row.unexplained = explanation(case, engine, method, steps, q)
+    return row
+
+
+def add_as_read(
+    result: EnginesResult, case: Case, dynamics: Dynamics, method: Method, as_set: ServoRow
+) -> None:
+    """The response with the numbers that an engine has read, which explain it where it is another one."""
+    row = replace(as_set, method=f"{method.name}, as read", ended=None)
+    follow_row(result, case, dynamics, method, row)
+    change = float(np.abs(result.responses[row.label][1] - result.responses[as_set.label][1]).max())
+    if not change <= ALIKE * (as_set.deviation or 0.0):
+        row.why, row.unexplained = "reading", None
+
+
+def follow_row(result: EnginesResult, case: Case, dynamics: Dynamics, method: Method, row: ServoRow) -> Array:
+    """The positions of a run; its deviation is in the row, which is added."""
+    exact = reference(case)
+    run = follow(dynamics, case, method, Setting(case.duration, round(case.duration / row.dt)), exact)
+    q, deviation = run.motion.q, float(run.error.max())
+    ended = run.motion.ended or diverged_at(case, exact.t, q, run.motion.v)
+    row.deviation, row.ended = (None, str(ended)) if ended else (deviation, None)
+    result.tables["engines_servos"].append(row)
+    positions = exact.high[:, : case.coordinates.nq]
+    result.responses[row.label] = exact.t, case.coordinates.difference(q, positions)
+    return q
 
 
 def steps_of(setup: Setup, case: Case) -> int:

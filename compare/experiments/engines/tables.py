@@ -1,5 +1,6 @@
 """The tables of other engines: one row of each."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -8,7 +9,7 @@ from ...core.check import Result
 from ...core.rows import Row, column
 
 
-@dataclass
+@dataclass(kw_only=True)
 class EngineRow(Row):
     """A quantity of an engine compared with exact values, with what it has read and with what this program has set."""
 
@@ -18,16 +19,16 @@ class EngineRow(Row):
     quantity: str
     unit: str
     states: int
-    as_read_over_bar: float | None  # None: not computed; equal to difference_over_bar where nothing is set
+    as_read_over_bar: float  # equal to difference_over_bar where nothing is set
     worst_difference: float | None
     bar: float
-    difference_over_bar: float | None = None
-    difference_eps: float = np.inf  # the largest distance from the exact value
-    mujoco_eps: float = np.inf
-    worst_q: str = ""
-    worst_qd: str = ""
-    worst_tau: str = ""
-    passed: bool = False
+    difference_over_bar: float | None
+    difference_eps: float  # the largest distance from the exact value
+    mujoco_eps: float
+    worst_q: str
+    worst_qd: str
+    worst_tau: str
+    passed: bool
 
 
 @dataclass
@@ -98,7 +99,7 @@ class ServoRow(Row):
     method: str
     servo: str  # whose law acts, and when: servos.OWN, HELD, AT_EACH_STAGE
     dt: float = column("s", digits=5)
-    deviation: float | None = column("rad")
+    deviation: float | None = column("rad", default=None)
     why: str = ""  # what explains the deviation, see servos.alike; "": nothing does
     unexplained: float | None = column("rad", default=None)  # difference from the run that explains it
     ended: str | None = None
@@ -124,12 +125,21 @@ class BatchRow(Row):
 
 
 @dataclass
+class Share:
+    """What is said of what one engine has read."""
+
+    way: str  # ReadModel.way
+    unwritten: Sequence[str]  # what a URDF cannot state, set here
+    differing: list[str] = field(default_factory=list)  # what it has read differently, or lacks
+
+
+@dataclass
 class EnginesResult(Result):
-    mended: dict[str, list[str]] = field(default_factory=dict)  # the numbers of each engine that are set here
-    otherwise: dict[str, list[str]] = field(default_factory=dict)  # what each has read differently, or lacks
-    unwritten: dict[str, list[str]] = field(default_factory=dict)  # what a URDF cannot state, set here
-    by_urdf: list[str] = field(default_factory=list)  # engines that read a URDF written here
-    by_compiled: list[str] = field(default_factory=list)  # engines that take MuJoCo's compiled model
+    readers: dict[str, Share] = field(default_factory=dict)  # by the labels of engines
     # by the labels of ServoRow: times, s, and deviations from the exact response, (times, nv)
     responses: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     not_asked: list[str] = field(default_factory=list)  # engines of which nothing is said
+
+    def labels(self, way: str) -> list[str]:
+        """The engines that read the file in a way."""
+        return [label for label, share in self.readers.items() if share.way == way]

@@ -1,4 +1,4 @@
-"""The compiled model compared with the stated numbers, with those of a solution, or with those that its file states."""
+"""The compiled model beside the stated numbers, those of a solution, or those that its file states."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -83,7 +83,7 @@ def urgency(cause: Cause) -> tuple[int, bool, float]:
 
 
 def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:
-    """The bodies of the robot, by its names, whose mass the compiler takes from geoms, because the file states no inertial."""
+    """The bodies, by the robot's names, whose mass the compiler takes from geoms: the file states no inertial."""
     source = setup.engines["mujoco"].source if isinstance(setup.engines["mujoco"], Mujoco) else None
     if source is None or source.spec is None:
         return []
@@ -116,7 +116,7 @@ def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
 
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict[str, Any]:
-    """The numbers of a Tree by quantity: arrays per joint, speed, position or body, or one. joints, bodies: in this order."""
+    """The numbers of a Tree by quantity, per joint, speed, position or body, or one; joints and bodies in this order."""
     anchors, _, _ = places_of(tree)
     places = [tree.coordinates.joints[j] for j in joints]
     counts = [place.q.stop - place.q.start for place in places]
@@ -134,7 +134,7 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
 
 
 def stated_of_hinges(tree: tmt.Tree) -> dict[str, Any]:
-    """The quantities of `parameters` by the stated numbers of hinges, arrays per hinge, per body, or one; the others are 0."""
+    """The quantities of `parameters` by the stated numbers of hinges; the others are 0."""
     joints, bodies = range(len(tree.joint_names)), range(len(tree.body_names))
     return dict.fromkeys(STATED_FLAGS, 1.0) | {"order": joints} | numbers_of(tree, joints, bodies)
 
@@ -152,7 +152,7 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
 
 
 def compare_features(result: Result, robot: Robot) -> list[Cause]:
-    """Checks that features without a term in the equations are as many as in the solution; the causes where they are not."""
+    """Checks that features without a term in the equations are as many as in the solution; else causes."""
     compiled = {feature.feature: feature for feature in robot.features}
     stated = {feature.feature: feature for feature in robot.features_stated}
     causes = []

@@ -1,4 +1,4 @@
-"""One cause for numbers that are wrong together: a common factor, numbers exchanged, the same at several places, a vector."""
+"""One cause for numbers that are wrong together: a common factor, exchanged, the same at several places, a vector."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -9,7 +9,7 @@ import numpy as np
 from ...core.cause import Cause
 from ...core.text import block
 from ...engines.mujoco.parameters import Stated
-from ...robots.inertia import point_inertia
+from ...robots.coordinates import point_inertia
 from .numbers import COMPONENTS
 
 SAME = 1e-9  # relative: a factor, or a number, that is the same at several places
@@ -18,7 +18,7 @@ OF_INERTIAL = ("mass", "com", "inertia")
 
 
 class Numbers(NamedTuple):
-    """A quantity of a body or a joint, stated and compiled, and its causes, one for each component that differs."""
+    """A quantity of a body or a joint, and its causes, one for each component that differs."""
 
     number: Stated
     unit: str
@@ -34,7 +34,7 @@ class Numbers(NamedTuple):
 
 
 def causes_in_common(numbers: Sequence[Numbers], from_geoms: Sequence[str]) -> list[Cause]:
-    """The causes of all numbers, those of one error as one. from_geoms: bodies for which the file has no inertial."""
+    """The causes of all numbers, of one error one. from_geoms: bodies for which the file has no inertial."""
     left, causes = [each for each in numbers if each.causes], list[Cause]()
 
     def explain(together: Sequence[Numbers], *cause: Cause) -> None:
@@ -73,7 +73,7 @@ def without(numbers: Sequence[Numbers], others: Sequence[Numbers]) -> list[Numbe
 
 
 def load_of(numbers: Sequence[Numbers]) -> dict[str, Any] | None:
-    """The mass, kg, and the place, m from the joint, of a body that is added or missing; None: no body makes the difference."""
+    """The mass, kg, and the place, m from the joint, of a body that is added or missing, if one is."""
     if len(numbers) < len(OF_INERTIAL):
         return None
     by_name = {each.number.quantity: each for each in numbers}
@@ -89,7 +89,7 @@ def load_of(numbers: Sequence[Numbers]) -> dict[str, Any] | None:
 
 
 def common_factor(numbers: Sequence[Numbers]) -> float | None:
-    """The factor, not 1, between all stated and compiled numbers of at least two places; None: they have no common one."""
+    """The factor, not 1, between all stated and compiled numbers of at least two places, if there is one."""
     if len(numbers) < 2:
         return None
     stated, compiled = (np.concatenate(values) for values in zip(*((n.stated, n.compiled) for n in numbers)))
@@ -142,7 +142,7 @@ def of_group(numbers: Sequence[Numbers]) -> list[Cause]:
 
 
 def values_of(number: Numbers) -> dict[str, Any]:
-    """What is said of a number, a vector or a tensor: components that differ, and whether two of a diagonal are exchanged."""
+    """What is said of a vector or a tensor: components that differ, and whether two of a diagonal are exchanged."""
     names = COMPONENTS[len(number.stated)]
     differs = np.abs(number.compiled - number.stated) > number.number.tolerance
     is_upper = np.array([name == "".join(sorted(name)) for name in names])
@@ -157,7 +157,7 @@ def values_of(number: Numbers) -> dict[str, Any]:
 def as_one(
     numbers: Sequence[Numbers], kind: str, values: Mapping[str, Any], stated: Any = None, compiled: Any = None
 ) -> Cause:
-    """A cause instead of those of some numbers. stated, compiled: its values, None: those of the first cause."""
+    """A cause instead of those of some numbers. stated, compiled: None: those of the first cause."""
     causes = [cause for each in numbers for cause in each.causes]
     first, text = causes[0], block("parameters", kind, **values)
     place = text.partition(":")[0]

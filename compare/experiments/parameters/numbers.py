@@ -1,4 +1,4 @@
-"""A number of the model, stated and compiled: its rows, check and causes; that no other forces act; what touches."""
+"""A number, stated and compiled: its rows, check and causes; that no other forces act; what touches."""
 
 import math
 from collections.abc import Mapping
@@ -93,7 +93,7 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
 def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> list[Cause]:
     """Add the check of a number of a body or joint; the causes, one for each component that differs.
 
-    words: for whole numbers. Rank 1: an option, or a convention of a joint (its order, its sign, its zero); 2: one number.
+    words: for whole numbers. Rank 1: an option, or a convention of a joint (order, sign, zero); 2: one number.
     """
     quantity, tolerance = number.quantity, number.tolerance
     stated, compiled = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
@@ -124,9 +124,9 @@ def cause(place: str, stated: float, compiled: float, text: str, **more: Any) ->
 
 
 def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics) -> list[Cause]:
-    """Check that no forces act that the equations do not have; these are causes unless those of the result explain them.
+    """Check that no other forces act; these are causes unless those of the result explain them.
 
-    Fluid and tendons: MuJoCo adds their forces to those of springs and damping, of whose sum the rounding is allowed.
+    MuJoCo adds forces of fluid and tendons to springs and damping, of whose sum the rounding is allowed.
     """
     unexplained, tree = [], sample.tree
     largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
@@ -153,7 +153,7 @@ class Touch(NamedTuple):
 
 
 def touches(setup: Setup, dynamics: MujocoDynamics) -> list[Touch]:
-    """The pairs of geoms that touch, each where it does first: in a scene as MuJoCo runs it, at a random state."""
+    """The pairs of geoms that touch, each where it first does: in a scene as MuJoCo runs it, at a random state."""
     if not dynamics.may_touch:
         return []
     found: dict[tuple[str, str], Touch] = {}

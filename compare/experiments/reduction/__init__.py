@@ -16,13 +16,19 @@ from ...judge.scale import FACTOR
 from ...robots import Robot
 from .. import Experiment
 from ..setup import Setup, nothing
+from . import of_file
 from .exact_motion import compare_swing, is_pendulum
 from .needs import compare_case, joint_word
 from .records import Need, ReductionResult
 from .sub_blocks import compare_blocks
 from .times import largest_gain, time_models
 
-EXPERIMENT = Experiment(order=110, serves_own=False, options=("--scenes",), timed=True)
+EXPERIMENT = Experiment(
+    order=110,
+    serves_own=False,
+    options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
+    timed=True,
+)
 NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
@@ -40,6 +46,8 @@ def begin(setup: Setup) -> Iterable[ReductionResult]:
 def rows(setup: Setup, work: Iterable[ReductionResult] | None = None) -> ReductionResult:
     """Sub-blocks with joints locked; what each case needs, its runs and times; exact solutions."""
     (result,) = begin(setup) if work is None else work
+    if setup.alone and setup.reading and not setup.robot.is_stated:
+        of_file.add(result, setup, setup.reading)
     if result.models is not None:
         setup.quiet()
         time_models(result, setup, rounds=setup.of(64, 16, 2))
@@ -74,7 +82,8 @@ def untimed(setup: Setup) -> ReductionResult:
     if driven := [case.name for case in robot.cases if case.controller]:
         result.find("driven", scenes=driven)
     try:
-        compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
+        if not (robot.is_read and setup.alone):  # there the locks of the smaller file are compared
+            compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
         models = [model for case in robot.cases_of_torque for model in compare_case(result, case, setup)]
         for case in robot.cases_of_torque:
             if is_pendulum(case):
@@ -97,6 +106,8 @@ def add_not_lockable(result: ReductionResult, robot: Robot, error: ModelError) -
 def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:
     from . import figures_reduction  # matplotlib is for the process that draws
 
+    if frontier := result.tables.get("reduction_frontier"):
+        yield partial(figures_reduction.draw_frontier, result, frontier)
     needs = result.needs.values() if result.rows else ()  # empty if no joint can be locked
     if any(need.stays or need.locked or need.undecided for need in needs):
         yield partial(figures_reduction.draw_needs, result, robot)

@@ -1,5 +1,7 @@
 """Figures of reduction: the joints that each scene needs and the time of a step; exact swings."""
 
+from collections.abc import Sequence
+from itertools import cycle, product
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -9,9 +11,9 @@ from matplotlib.lines import Line2D
 from ...core.finding import Finding
 from ...core.words import capital
 from ...engines import COLOURS, LABELS, MARKS
-from ...report.style import BLUE, GREY, ORANGE, WIDTH, file_name
+from ...report.style import BLUE, GREY, LINES, ORANGE, WIDTH, file_name
 from ...robots import Robot
-from .records import Need, ReductionResult
+from .records import FrontierRow, Need, ReductionResult
 
 KINDS_OF_JOINT: dict[str, dict[str, Any]] = {
     "needed": {"marker": "o", "color": BLUE},
@@ -19,6 +21,7 @@ KINDS_OF_JOINT: dict[str, dict[str, Any]] = {
     "declared locked": {"marker": "x", "color": GREY},
     "not decided": {"marker": "d", "color": ORANGE, "mfc": "none"},
 }
+MARKS_OF_INTEGRATORS = "osD^v"
 HEIGHTS = {"tmt": -0.15, "mujoco": 0.15}  # of an engine's times in the line of a scene
 ABOVE: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "columnspacing": 1.0}
 
@@ -53,6 +56,39 @@ def draw_needs(result: ReductionResult, robot: Robot) -> tuple[str, Figure, Find
     ]
     right.legend(handles=handles, ncols=2, handletextpad=0.2, **ABOVE)
     return "reduction_needs", fig, result.finding("needs", robot=robot.name)
+
+
+def draw_frontier(result: ReductionResult, rows: Sequence[FrontierRow]) -> tuple[str, Figure, Finding]:
+    """Time over error: a colour for each model, a mark for each integrator."""
+    fig = Figure(figsize=(WIDTH, 4.5), layout="constrained")
+    ax = fig.subplots()
+    colours = dict(zip(dict.fromkeys(row.model for row in rows), cycle(colour for colour, _ in LINES)))
+    marks = dict(zip(dict.fromkeys(row.integrator for row in rows), MARKS_OF_INTEGRATORS))
+    for (model, colour), (integrator, mark) in product(colours.items(), marks.items()):
+        points = [
+            (row.error, row.time_of_second)
+            for row in rows
+            if (row.model, row.integrator) == (model, integrator)
+        ]
+        if points:
+            ax.plot(*zip(*points), color=colour, marker=mark, markersize=4.5, linewidth=0.7)
+    for row in rows:
+        if row.best_for:
+            ax.plot(row.error, row.time_of_second, "ko", markersize=11, markerfacecolor="none")
+            ax.annotate(
+                f"{row.best_for}: ×{row.gain:.1f}",
+                (row.error, row.time_of_second),
+                (6, -10),
+                textcoords="offset points",
+            )
+    handles = [Line2D([], [], color=colour, label=model) for model, colour in colours.items()]
+    handles += [
+        Line2D([], [], color="black", linestyle="none", marker=mark, label=name)
+        for name, mark in marks.items()
+    ]
+    fig.legend(handles=handles, loc="outside right upper", fontsize=7)
+    ax.set(xscale="log", yscale="log", xlabel="error, rad or m", ylabel="time for a second of motion, s")
+    return "reduction_frontier", fig, result.finding("frontier", "reduction_of_file")
 
 
 def look_of(engine: str) -> dict[str, Any]:

@@ -44,6 +44,73 @@ class SubsetRow(Row):
     difference_over_bar: float | None = None
 
 
+@dataclass(kw_only=True)
+class StageRow(Row):
+    """A stage of a step by MuJoCo's own timers: of the whole file, without what is not used, and of the smaller file."""
+
+    stage: str
+    whole_file: float = column("us")
+    free_file: float = column("us")
+    smaller_file: float = column("us")
+
+
+@dataclass(kw_only=True)
+class FreeRow(Row):
+    """What was taken out of a file; it is back if the motion was not the same to the last bit."""
+
+    kind: str
+    taken_out: int
+    same_bits: bool
+    before: float | None = column("us", default=None)  # of a step
+    after: float | None = column("us", default=None)
+
+
+@dataclass(kw_only=True)
+class JointRow(Row):
+    """How far a joint moved, rad or m, and how far it would move another one if it were locked; None: it is not to be."""
+
+    joint: str
+    moved: float
+    predicted: float | None
+    locked: bool
+
+
+@dataclass(kw_only=True)
+class PairRow(Row):
+    """Geoms that came near and never touched."""
+
+    geom: str
+    other: str
+    distance: float = column("m")
+
+
+@dataclass(kw_only=True)
+class LimitRow(Row):
+    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv."""
+
+    model: str
+    integrator: str
+    limit: str
+    step: float | None = column("s", digits=4)
+    joint: str
+
+
+@dataclass(kw_only=True)
+class FrontierRow(Row):
+    """A model with an integrator and a step: time over error, rad or m. best_for: the errors within which it is the fastest."""
+
+    model: str
+    locked: int
+    integrator: str
+    dt: float = column("s")
+    error: float
+    error_of_model: float
+    error_of_step: float
+    time_of_second: float = column("s", default=0.0)  # of motion
+    gain: float = 1.0  # over the file as it is
+    best_for: str = ""
+
+
 Model = tuple[str, Case | None]  # the name of a scene, and what is run; None: nothing moves
 
 

@@ -33,9 +33,7 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
         return
     if len(robot.joints) > ALL_SUBSETS:
         angles, states = 1, setup.of(4, 2, 2)
-    units = {"Mbar": "kg m2", "bias": "N m"}
-    if "slide" in coordinates.all_kinds:
-        units = {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}
+    units = units_of(coordinates)
     for locked in subsets(robot.joints, setup.of(12, 6, 4)):
         choices = []  # of the angles at which they are locked
         for _ in range(angles):
@@ -47,6 +45,12 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
             apart, scale = np.concatenate([choice[quantity, pair] for choice in choices], axis=1)
             row = SubsetRow(locked=" ".join(locked), quantity=quantity, parties=pair, unit=units[quantity])
             check_blocks(result, scene_name(locked), row, apart, scale)
+
+
+def units_of(coordinates: Coordinates) -> dict[str, str]:
+    if "slide" in coordinates.all_kinds:
+        return {"Mbar": "kg m2, kg m or kg", "bias": "N m or N"}
+    return {"Mbar": "kg m2", "bias": "N m"}
 
 
 def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
@@ -76,7 +80,7 @@ def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, 
     check = result.check(where, name, apart[worst], tolerance[worst], row.unit, rounding=True)
     row.states, row.largest_difference = len(apart), number_or_none(apart.max())
     row.difference_over_bar = check.over_tolerance
-    result.tables["reduction_subsets"].append(row)
+    result.tables.setdefault("reduction_subsets", []).append(row)
 
 
 def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray) -> Differences:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
-from ..figures import OUTLINE, chart
+from ..figures import chart
 from .conclusions import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
 from .runs import SpeedResult, SpeedRow
 
@@ -57,16 +57,8 @@ def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
         colour, (errors, times) = COLOURS.get(engine, GREY), drawn(rows)
         label, mark = LABELS.get(engine, engine), MARKS.get(engine, "v")
         ax.plot(errors, times, label=label, color=colour, marker=mark, markersize=3.5, linewidth=1.2)
-        best = within_target(rows)
-        if best:
-            (error,), (time,) = drawn([best])
-            ax.plot(error, time, "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
-        if best and engine in ("mujoco", "tmt"):
-            above, fine = engine == "mujoco", error < np.sqrt(errors[0] * errors[-1])
-            text = f"{best.method} {float(f'{time:.2g}'):g} ms"
-            ax.annotate(text, (error, time), (0, 8 if above else -11), fontsize=8, color=colour,
-                        textcoords="offset points", ha="right" if above else "center" if fine else "left",
-                        va="bottom" if above else "top", path_effects=OUTLINE)  # fmt: skip
+        if best := within_target(rows):
+            ax.plot(*drawn([best]), "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
     ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {result.unit} (decreasing)", ylabel="time, ms")
     ax.invert_xaxis()

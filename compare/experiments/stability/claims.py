@@ -5,19 +5,18 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...core.check import About, Result
-from ...engines import LABELS, Engine
+from ...engines import LABELS, Engine, Method
 from ...judge.run import LEFT, departure, deviation, number_or_none
-from ...robots import Robot
-from ...robots.robot import Claims
+from ...robots import Claims, Robot
 from ...stability.held import Held, held
 from .departure import check_row, own_torque, predicted, residual, variants
 from .subjects import fraction, rk4_of_both
-from .tables import ClaimRow, FinerRow, KeptRow, TorqueRow
+from .tables import ClaimRow
 
 CLEAR_ULPS = 16  # of each component: a push that rounding of the bias on the way cannot turn round
 VARIANT, NEAREST = "variant", "nearest to own bias"  # names of torques
@@ -38,18 +37,26 @@ def claims_of(robot: Robot) -> Claims:
     return robot.claims
 
 
-def add_rows(result: Result, rows: Sequence[ClaimRow]) -> None:
-    result.tables.setdefault("stability_claims", []).extend(rows)
+def claim_row(claim: int, at: Held, method: Method, dt: float, path: np.ndarray, **more: Any) -> ClaimRow:
+    """When a run of a claim leaves, and to which side. path: positions, (steps + 1, n)."""
+    left = departure(dt * np.arange(len(path)), path)
+    return ClaimRow(
+        claim=claim, scene=at.name, engine=method.engine, method=method.name, dt=dt, observed=left,
+        direction=side(path, left, dt), **more,
+    )  # fmt: skip
+
+
+def side(path: np.ndarray, left: float | None, dt: float) -> int | None:
+    """The side of its start on which the first joint is at departure: 1 larger, -1 smaller; None: never, or NaN."""
+    away = np.nan if left is None else path[round(left / dt), 0] - path[0, 0]
+    return int(np.sign(away)) if np.isfinite(away) else None
 
 
 # claim 1
 
 
-def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[TorqueRow]:
-    """All torques within one ulp of TMT's holding torque by RK4; then own biases; then 16 ulps.
-
-    push: what the residual, the torque beyond the one that holds, does to the fastest unstable mode.
-    """
+def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[ClaimRow]:
+    """All torques within one ulp of TMT's holding torque by RK4; then own biases; then 16 ulps."""
     claims, at = claims_of(robot), held(robot, claims_of(robot).left)
     steps = round(WATCHED * claims.duration / claims.dt)
     within = variants(at.tau)
@@ -64,19 +71,11 @@ def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[TorqueR
         motion = engines[method.engine].of(at.case).run(at.q + rest, rest, tau, claims.dt, steps, method.name)
         expected = predicted(at, method.scheme, claims.dt, rest, off)
         for k, path in enumerate(motion.q):
-            left = departure(motion.t, path)
-            rows.append(TorqueRow(
-                scene=at.name, engine=method.engine, method=method.name, dt=claims.dt, torque=names[k],
-                push=float(pushes(at) @ off[k]), predicted=expected[k], observed=left,
-                direction=side(path, left, claims.dt), moved=number_or_none(deviation(path, at.q)),
+            rows.append(claim_row(
+                1, at, method, claims.dt, path, torque=names[k], push=float(pushes(at) @ off[k]),
+                predicted=expected[k], moved=number_or_none(deviation(path, at.q)),
             ))  # fmt: skip
     return rows
-
-
-def side(path: np.ndarray, left: float | None, dt: float) -> int | None:
-    """The side of its start on which the first joint is at departure: 1 larger, -1 smaller; None: never, or NaN."""
-    away = np.nan if left is None else path[round(left / dt), 0] - path[0, 0]
-    return int(np.sign(away)) if np.isfinite(away) else None
 
 
 def pushes(at: Held) -> np.ndarray:
@@ -89,9 +88,9 @@ def pushes(at: Held) -> np.ndarray:
     return (measure[n:] / np.linalg.norm(measure[n:])).real @ np.linalg.inv(at.mass_matrix)
 
 
-def check_torques(result: Result, robot: Robot, torques: list[TorqueRow]) -> None:
+def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None:
     """Claim 1: the posture is left after about the claimed time, because of rounding."""
-    add_rows(result, torques)
+    result.tables.setdefault("stability_claims", []).extend(torques)
     claims, reproduced, values = claims_of(robot), True, []
     for engine, method in dict.fromkeys((row.engine, row.method) for row in torques):
         of_engine = [row for row in torques if row.engine == engine]
@@ -99,12 +98,13 @@ def check_torques(result: Result, robot: Robot, torques: list[TorqueRow]) -> Non
         (own,) = (row for row in of_engine if row.torque == NEAREST)
         where, first = f"{claims.left}, {LABELS[engine]} {method}", len(result.checks)
         for row in (row for row in of_engine if row.torque in CLEAR_TORQUES):
-            along = None if row.direction is None else row.direction * np.sign(row.push)
-            text = "departure along the push of the residual (1; against it: -1)"
-            result.check(
-                f"{where}, torque {row.torque}", text, along, 1, "", rule="equal", about=About.PREDICTION
+            along = None if row.direction is None else row.direction * np.sign(row.push or 0.0)
+            at, text = (
+                f"{where}, torque {row.torque}",
+                "departure along the push of the residual (1; against it: -1)",
             )
-            check_row(result, f"{where}, torque {row.torque}", row)
+            result.check(at, text, along, 1, "", rule="equal", about=About.PREDICTION)
+            check_row(result, at, row)
         if (
             engine == "mujoco"
         ):  # of TMT no double need be the bias: compiled code rounds its last sum only once
@@ -128,12 +128,8 @@ def check_torques(result: Result, robot: Robot, torques: list[TorqueRow]) -> Non
 
 def finer_steps(
     robot: Robot, engines: Mapping[str, Engine], counts: Sequence[int] = STEP_COUNTS
-) -> list[FinerRow]:
-    """Departure under RK4 against the step, the torque one ulp off to either side at the first joint.
-
-    moved: the largest movement in a run of the claims; step: the largest dt |qd| by then; half_ulp: half
-    a unit in the last place of the angle that it would have to change.
-    """
+) -> list[ClaimRow]:
+    """Departure under RK4 against the step, the torque one ulp off to either side at the first joint."""
     claims, at = claims_of(robot), held(robot, claims_of(robot).left)
     rest, rows = np.zeros_like(at.q), []
     for method in rk4_of_both(engines):
@@ -144,21 +140,18 @@ def finer_steps(
             for count in counts:
                 dt = claims.duration / count
                 motion = dynamics.run(at.q, rest, tau, dt, round(WATCHED * count), method.name)
-                left = departure(motion.t, motion.q)
                 i = int(np.argmax(np.abs(motion.v[count]) / np.spacing(np.abs(at.q))))
-                rows.append(FinerRow(
-                    scene=at.name, engine=method.engine, method=method.name, dt=dt, ulps=int(sign), observed=left,
-                    direction=side(motion.q, left, dt),
+                rows.append(claim_row(
+                    2, at, method, dt, motion.q, ulps=int(sign),
                     moved=number_or_none(deviation(motion.q[: count + 1], at.q)),
-                    step=number_or_none(dt * abs(motion.v[count, i])),
-                    half_ulp=0.5 * float(np.spacing(abs(at.q[i]))),
+                    step=number_or_none(dt * abs(motion.v[count, i])), half_ulp=0.5 * float(np.spacing(abs(at.q[i]))),
                 ))  # fmt: skip
     return rows
 
 
-def check_finer_steps(result: Result, robot: Robot, finer: list[FinerRow]) -> None:
+def check_finer_steps(result: Result, finer: list[ClaimRow], robot: Robot) -> None:
     """Claim 2: a smaller step reverses the side, and a very small one leaves the robot in place."""
-    add_rows(result, finer)
+    result.tables.setdefault("stability_claims", []).extend(finer)
     claims, still, turned, leave = claims_of(robot), True, 0, True
     series = list(dict.fromkeys((row.engine, row.ulps) for row in finer))
     for engine, sign in series:
@@ -181,58 +174,50 @@ def check_finer_steps(result: Result, robot: Robot, finer: list[FinerRow]) -> No
 # claim 3
 
 
-class KeptRuns(NamedTuple):
-    """Runs of claim 3. limit: of RK4's step, s; fastest: rate of a mode, 1/s; acceleration_at_end: of each engine."""
-
-    rows: list[KeptRow]
-    limit: float
-    fastest: float
-    acceleration_at_end: dict[str, np.ndarray]
-
-
-def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -> KeptRuns:
-    """RK4 at the posture that is kept, below and beyond its limit, the torque one ulp off; and whether it ends as claimed.
-
-    acceleration_at_end: of each engine at the claimed end, under the torque that holds the posture.
-    """
-    claims, at = claims_of(robot), held(robot, claims_of(robot).kept)
-    rest, rows, pushed = np.zeros_like(at.q), [], {}
+def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -> list[ClaimRow]:
+    """RK4 at the posture that is kept, below and beyond its limit, the torque one ulp off."""
+    at = held(robot, claims_of(robot).kept)
+    rest, rows = np.zeros_like(at.q), []
     for method in rk4_of_both(engines):
-        tau, dynamics = (
-            np.nextafter(own_torque(method, engines, at), np.inf),
-            engines[method.engine].of(at.case),
-        )
+        tau = np.nextafter(own_torque(method, engines, at), np.inf)
+        dynamics = engines[method.engine].of(at.case)
         for dt in STEPS_BEYOND:
             with np.errstate(over="ignore", invalid="ignore"):
                 motion = dynamics.run(at.q, rest, tau, dt, steps, method.name)
             fast = ~(np.abs(motion.v).max(axis=1) < DIVERGED_RATE)  # no number from there on is motion
-            rows.append(KeptRow(
-                scene=at.name, engine=method.engine, method=method.name, dt=dt, torque=ONE_ULP,
-                observed=departure(motion.t, motion.q),
+            rows.append(claim_row(
+                3, at, method, dt, motion.q, torque=ONE_ULP, run=dt * steps,
                 diverged_at=float(dt * np.argmax(fast)) if fast.any() else None,
-                moved=None if fast.any() else number_or_none(deviation(motion.q, at.q)), run=dt * steps,
+                moved=None if fast.any() else number_or_none(deviation(motion.q, at.q)),
             ))  # fmt: skip
-        pushed[method.engine] = dynamics.acceleration(robot.posture(claims.end), rest, at.tau)
-    rate = float(np.abs(at.modes[0]).max())
-    return KeptRuns(rows, at.limit("rk4")[1] or 0.0, rate, pushed)
+    return rows
 
 
-def check_kept(result: Result, robot: Robot, runs: KeptRuns) -> None:
-    """Claim 3: held beyond the limit of RK4."""
-    claims, rows, limit, stays = claims_of(robot), runs.rows, runs.limit, True
-    add_rows(result, rows)
+def accelerations_at_end(robot: Robot, engines: Mapping[str, Engine]) -> dict[str, float]:
+    """The largest acceleration at the claimed end under the torque that holds the other posture, rad/s2, by engine."""
+    claims, at = claims_of(robot), held(robot, claims_of(robot).kept)
+    q, sizes = robot.posture(claims.end), {}
+    for method in rk4_of_both(engines):
+        qdd = engines[method.engine].of(at.case).acceleration(q, np.zeros_like(q), at.tau)
+        sizes[LABELS[method.engine]] = float(np.abs(qdd).max())
+    return sizes
+
+
+def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping[str, float]) -> None:
+    """Claim 3: held beyond the limit of RK4. ends: accelerations at the claimed end, rad/s2."""
+    claims, stays, leaves_end, about = claims_of(robot), True, False, About.PREDICTION
+    at = held(robot, claims.kept)
+    limit, rate = at.limit("rk4")[1] or 0.0, float(np.abs(at.modes[0]).max())
+    result.tables.setdefault("stability_claims", []).extend(rows)
     for row in (row for row in rows if row.dt < limit):
         where = f"{claims.kept}, {row.who}, dt = {row.dt:.4g} s, torque {row.torque}"
-        time = row.run if row.observed is None else row.observed
+        run = row.run or 0.0
+        time = run if row.observed is None else row.observed
         what = f"time within {LEFT:g} rad, below the limit"
-        stays &= result.check(where, what, time, row.run, "s", rule="at least", about=About.PREDICTION).passed
-    ends, leaves_end = (
-        {LABELS[name]: float(np.abs(a).max()) for name, a in runs.acceleration_at_end.items()},
-        False,
-    )
+        stays &= result.check(where, what, time, run, "s", rule="at least", about=about).passed
     for label, size in ends.items():
+        where = f"{claims.end}, {label}"
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        where, about = f"{claims.end}, {label}", About.PREDICTION
         leaves_end |= result.check(
             where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about
         ).passed
@@ -240,7 +225,7 @@ def check_kept(result: Result, robot: Robot, runs: KeptRuns) -> None:
     moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)
     result.find(
         "claim_3", reproduced=("bounded" if leaves_end else "yes") if stays and moves else "no", posture=claims.kept,
-        end=claims.end, noun=robot.noun, limit=limit, rate=runs.fastest, above=len(above), ends=ends,
+        end=claims.end, noun=robot.noun, limit=limit, rate=rate, above=len(above), ends=ends,
         diverged=sum(row.diverged_at is not None for row in above),
         farthest=max((row.moved for row in above if row.moved is not None), default=None),
     )  # fmt: skip

@@ -11,9 +11,9 @@ from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
 from ...stability.held import NEGLIGIBLE, Held
 from .subjects import mujoco_of, unit_of_movements
-from .tables import DepartureRow, TorqueRow
+from .tables import ClaimRow, DepartureRow
 
-Departure = DepartureRow | TorqueRow  # with a predicted and an observed time
+Departure = DepartureRow | ClaimRow  # with a predicted and an observed time
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
@@ -66,9 +66,8 @@ def departures(
     sizes = [(size, True) for size in PERTURBATIONS] + [(size, False) for size in TORQUE_ERRORS]
     moved = np.array([size * shape * is_push for size, is_push in sizes])
     # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
-    errors = np.array(
-        [size * at.mass_matrix @ shape * rate.real**2 * (not is_push) for size, is_push in sizes]
-    )
+    force = at.mass_matrix @ shape * rate.real**2
+    errors = np.array([size * force * (not is_push) for size, is_push in sizes])
     for method in (method for method in methods if is_led(at, method.scheme, dt)):
         torques = own_torque(method, engines, at) + errors
         expected = predicted(at, method.scheme, dt, moved, residual(method, engines, at, torques))
@@ -105,10 +104,8 @@ def check_row(result: Result, where: str, row: Departure) -> None:
     off = late(row)
     missing = {"the run stays": row.observed, "the prediction stays": row.predicted}
     note = " and ".join(text for text, time in missing.items() if time is None)
-    quantity = "departure, observed - predicted"
-    result.check(
-        where, quantity, None if off is None else abs(off), near(row), "s", note, about=About.PREDICTION
-    )
+    value, quantity = None if off is None else abs(off), "departure, observed - predicted"
+    result.check(where, quantity, value, near(row), "s", note, about=About.PREDICTION)
 
 
 def near(row: Departure) -> float:
@@ -118,13 +115,10 @@ def near(row: Departure) -> float:
 
 def departure_values(rows: list[DepartureRow]) -> dict[str, Any]:
     """How many departures are as predicted, and the largest difference, s."""
-    off = [
-        abs(row.observed - row.predicted)
-        for row in rows
-        if row.observed is not None and row.predicted is not None
-    ]
-    close = sum((by := late(row)) is not None and abs(by) <= near(row) for row in rows)
-    return {"count": len(rows), "close": close, "worst": max(off, default=None)}
+    off = [late(row) for row in rows]
+    close = [by is not None and abs(by) <= near(row) for by, row in zip(off, rows)]
+    known = [abs(by) for by, row in zip(off, rows) if by is not None and row.observed is not None]
+    return {"count": len(rows), "close": sum(close), "worst": max(known, default=None)}
 
 
 # torques that hold

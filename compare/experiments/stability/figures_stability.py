@@ -1,4 +1,4 @@
-"""Figures: step limits, also of the first screen; departure; claims."""
+"""Figures: step limits, also of the first screen; growth of a file's steps; departure; claims."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -17,8 +17,9 @@ from ..figures import MOST_ROWS, chart, named_rows
 from .claims import VARIANT, claims_of
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
+from .of_file import OF
 from .subjects import fraction, unit_of_movements
-from .tables import FinerRow, LimitRow, StabilityResult, TorqueRow
+from .tables import ClaimRow, LimitRow, StabilityResult
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),
@@ -29,6 +30,15 @@ SCHEME_LOOKS = {  # colour, dash, name
     "gauss_legendre_4": (PINK, (0, (3, 1, 1, 1, 1, 1)), "Gauss-Legendre 4"),
     "dopri8": (SKY, (0, (4, 2)), "Dormand-Prince 8"),
 }
+GROWTH_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn over each other, the wider one below
+    "Euler": (BLUE, "-", "o", 1.3),
+    "implicitfast": (ORANGE, "-", "s", 3.2),
+    "implicit": (RED, (0, (4, 2)), "D", 1.2),
+    "discrete": (GREEN, "-.", "v", 1.3),
+    "RK4": (PINK, (0, (5, 1)), "^", 1.3),
+}
+TITLES = {"contact": "in contact", "free": "touching nothing", "air": "in the air"}
+MOST_GROWTH = 3.0  # of a step: the upper end of the axis
 MARKS, MUJOCO_MARKS = "ov^DsP", "x+1"
 
 
@@ -70,10 +80,9 @@ def limits_in(
     named_rows(ax, [look(name)[2] for name in of_scheme], passed)
     ax.tick_params(axis="y", labelsize=8)
     ax.set(xscale="log", xlim=(low, high))
-    ticks = [m * 10.0**k for k in range(-5, 4) for m in ((1, 2, 5) if high / low < 100 else (1,))]
-    ax.set_xticks(
-        [tick for tick in ticks if low < tick < high], [f"{tick:g}" for tick in ticks if low < tick < high]
-    )
+    decades = np.multiply.outer(10.0 ** np.arange(-5, 4), [1, 2, 5] if high / low < 100 else [1]).ravel()
+    ticks = decades[(low < decades) & (decades < high)]
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     ax.minorticks_off()
     return [
         *ax.plot([], [], "|", color=GREY, markersize=9, label="predicted"),
@@ -122,6 +131,37 @@ def draw_limits(
     return "stability_limits", fig, caption
 
 
+def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
+    """Growth over step: a line for each integrator, marks of runs, the file's own step; a panel for each surroundings."""
+    rows = result.tables["step_limits"]
+    dt, integrator, posture = rows[0].file_dt, rows[0].file_integrator, rows[0].posture
+    fig = Figure(figsize=(WIDTH, 3.8), layout="constrained")
+    panels = fig.subplots(1, len(result.growth), sharey=True, squeeze=False)[0]
+    for ax, (surroundings, curves) in zip(panels, result.growth.items()):
+        for name, curve in curves.items():
+            colour, dash, marker, width = GROWTH_LOOKS[name]
+            steps, factors = zip(*curve.predicted) if curve.predicted else ((), ())
+            ax.plot(steps, factors, color=colour, linestyle=dash, linewidth=width, label=name)
+            if curve.observed:
+                looks: dict[str, Any] = {
+                    "color": colour,
+                    "markersize": 6,
+                    "markeredgecolor": "black",
+                    "zorder": 4,
+                }
+                ax.plot(*zip(*curve.observed), marker, **looks)
+        ax.axhline(1.0, color="black", linewidth=0.6)
+        ax.axvline(dt, color="black", linewidth=0.8, linestyle=":")
+        ax.set(xscale="log", xlabel="dt, s", ylim=(0.9, MOST_GROWTH), title=TITLES[surroundings])
+    panels[0].set_ylabel("growth of a deviation in a step")
+    panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="in runs")
+    fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
+    here = [row for row in rows if (row.posture, row.surroundings) == (posture, next(iter(result.growth)))]
+    values = {"posture": posture, "dt": dt, "integrator": integrator}
+    radii = {row.integrator: row.predicted_dt for row in here}
+    return "stability_growth", fig, result.finding("figure_growth", OF, radii=radii, **values)
+
+
 def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Time to leave a saddle against the size of the perturbation."""
     unit, table = unit_of_movements(robot), result.tables["departure"]
@@ -142,9 +182,8 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
             colour, dash, _ = look(method)
             if engine == "tmt":
                 ax.plot(sizes, predicted, linestyle=dash, color=colour, linewidth=1)
-                ax.plot(
-                    sizes, observed, MARKS[k % 6], color=colour, mfc="none", markersize=11 - k, label=label
-                )
+                looks: dict[str, Any] = {"color": colour, "mfc": "none", "markersize": 11 - k, "label": label}
+                ax.plot(sizes, observed, MARKS[k % 6], **looks)
             else:
                 ax.plot(sizes, observed, MUJOCO_MARKS[k % 3], color="black", markersize=5, label=label)
         ax.set(xscale="log", ylim=(0, None), title=f"dt = {dt:.4g} s")
@@ -163,7 +202,7 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
     finer = [row for row in rows if row.claim == 2]
     fig = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     axes = fig.subplots(1, 1 + bool(finer), squeeze=False)[0]
-    draw_torques(axes[0], [row for row in rows if row.claim == 1 and row.torque.startswith(VARIANT)], robot)
+    draw_torques(axes[0], [row for row in rows if row.torque.startswith(VARIANT)], robot)
     if finer:
         draw_finer_steps(axes[1], finer, robot)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
@@ -171,7 +210,7 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
     return "stability_claims", fig, result.finding("figure_claims", **values, finer=bool(finer))
 
 
-def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
+def draw_torques(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
     """Claim 1: when and to which side the posture is left, over the push of the residual on the unstable mode."""
     symbol = robot.symbol(robot.joints[0])
     for engine, fill in (("tmt", "full"), ("mujoco", "none")):
@@ -179,29 +218,25 @@ def draw_torques(ax: Axes, rows: list[TorqueRow], robot: Robot) -> None:
             mine = [row for row in rows if (row.engine, row.direction) == (engine, side)]
             pushes, times = [row.push for row in mine], [number_or_nan(row.observed) for row in mine]
             label = f"{LABELS[engine]}, to {word} {symbol}"
-            ax.plot(
-                np.array(pushes) * 1e14,
-                times,
-                mark,
-                color=COLOURS[engine],
-                fillstyle=fill,
-                markersize=5,
-                label=label,
-            )
-    predicted = sorted((row.push * 1e14, number_or_nan(row.predicted)) for row in rows)
+            looks: dict[str, Any] = {
+                "color": COLOURS[engine],
+                "fillstyle": fill,
+                "markersize": 5,
+                "label": label,
+            }
+            ax.plot(np.array(pushes) * 1e14, times, mark, **looks)
+    predicted = sorted((number_or_nan(row.push) * 1e14, number_or_nan(row.predicted)) for row in rows)
     ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
     ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set(
-        title=f"claim 1: {claims_of(robot).left}",
-        xlabel="initial acceleration of the unstable mode, 1e-14 rad/s2",
-    )
+    ax.set_title(f"claim 1: {claims_of(robot).left}")
+    ax.set_xlabel("initial acceleration of the unstable mode, 1e-14 rad/s2")
     ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
 
 
-def draw_finer_steps(ax: Axes, rows: list[FinerRow], robot: Robot) -> None:
+def draw_finer_steps(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
     """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
     duration = claims_of(robot).duration
-    for engine, sign in dict.fromkeys((row.engine, row.ulps) for row in rows):
+    for engine, sign in dict.fromkeys((row.engine, row.ulps or 0) for row in rows):
         mine = [row for row in rows if (row.engine, row.ulps) == (engine, sign)]
         counts, times = [duration / row.dt for row in mine], [number_or_nan(row.observed) for row in mine]
         fill = "full" if engine == "tmt" else "none"

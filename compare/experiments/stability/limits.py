@@ -8,6 +8,7 @@ import numpy as np
 from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...stability.held import Held
+from ...stability.limits import bisected
 from .tables import LimitRow
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
@@ -18,12 +19,8 @@ GROWTH_MARGIN = (
     1e-3  # relative: a mode that grows by less from the second to the last quarter of a run does not grow
 )
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
-TRIED_ABOUT = np.array(
-    [0.5, 0.997, 1.004, 2.0]
-)  # times the predicted limit: among which the observed one is sought
-TRIED_OF_FASTEST = np.array(
-    [0.1, 1.0, 10.0]
-)  # times the time in which the fastest mode moves, if none is predicted
+# times the predicted limit; if there is none, the time in which the fastest mode moves: the observed one is sought among them
+TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.997, 1.004, 2.0]), np.array([0.1, 1.0, 10.0])
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
@@ -74,11 +71,7 @@ def observed_limit(
     failed = next((k for k, dt in enumerate(tried) if fails(dt)), None)
     if not failed:
         return ("never_fails" if failed is None else "always_fails"), None
-    low, high = tried[failed - 1], tried[failed]
-    while high / low > 1.0 + BISECTED:
-        middle = np.sqrt(low * high)
-        low, high = (low, middle) if fails(middle) else (middle, high)
-    return "finite", float(low)
+    return "finite", bisected(lambda dt: not fails(dt), tried[failed - 1], tried[failed], 1.0 + BISECTED)[0]
 
 
 def shares(
@@ -129,14 +122,10 @@ def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
     With little damping a mode hardly grows just above its limit.
     """
     for excess in np.geomspace(LIMIT_TOLERANCE, 1e3, 100):
-        if growth_shows(at, scheme, limit * (1.0 + excess), steps):
+        dt = limit * (1.0 + excess)
+        if at.growth(scheme, dt) ** (2 * quarter_of(at, dt, steps)) > 1.0 + GROWTH_MARGIN:
             break
     return float(excess)
-
-
-def growth_shows(at: Held, scheme: str, dt: float, steps: int) -> bool:
-    """Whether what grows at a step grows enough from the second to the last quarter of a run."""
-    return bool(at.growth(scheme, dt) ** (2 * quarter_of(at, dt, steps)) > 1.0 + GROWTH_MARGIN)
 
 
 def grows(early: np.ndarray, late: np.ndarray) -> bool:

@@ -1,21 +1,21 @@
 """The file's own run: everything on, from its own starts, at one step, and at finer ones where it does not come to rest."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
 
 from ...core.check import About, Result
 from ...engines.mujoco import Reading
-from ...engines.mujoco.linear import WholeRun, start_of, whole_run
 from ...engines.mujoco.names import on
+from ...engines.mujoco.step import WholeRun, start_of, whole_run
 from ...judge.run import number_or_none
 from ...robots.case import SEED
 from ...robots.file import names_of_keys
+from ...stability.place import MOST_POSTURES
 from ..setup import Setup
 from .tables import OwnRunRow
 
-MOST_STARTS = 6  # the first keyframes
 LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbers of steps it lasts
 LONGER = 3.0  # fold: where it has not come to rest it is run so long
 PARTS = 4  # of a run: the speeds of each are averaged
@@ -25,23 +25,14 @@ PUSH = (
 )
 CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
-OwnRuns = tuple[str, Iterable[OwnRunRow]]  # the quantity of their checks, and the runs
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
+ORDER = ("worse", "fails", "alike", "calm")  # of what is told first
 
 
-def begin(setup: Setup) -> list[OwnRuns]:
-    """Start the runs at the file's step, and at a requested one; none without a file's numbers."""
-    reading = setup.reading
-    if reading is None:
-        return []
-    steps = [(AT_OWN, reading.dt, reading.integrator)] + (
-        [(AT_REQUESTED, *setup.request.step)] if setup.request.step else []
-    )
-    starts = list(reading.keyframes)[:MOST_STARTS] or [""]
-    return [
-        (quantity, setup.map(partial(own_run, dt=dt, integrator=name, reading=reading), starts))
-        for quantity, dt, name in steps
-    ]
+def begin(setup: Setup, reading: Reading, dt: float, integrator: str) -> Iterable[OwnRunRow]:
+    """Start the runs at a step."""
+    starts = list(reading.keyframes)[:MOST_POSTURES] or [""]
+    return setup.map(partial(own_run, dt=dt, integrator=integrator, reading=reading), starts)
 
 
 def own_run(key: str, dt: float, integrator: str, reading: Reading) -> OwnRunRow:
@@ -88,20 +79,15 @@ def is_worse(own: WholeRun, finer: WholeRun) -> bool:
     return not finer.failed_at and not own.speeds[-1] <= max(CALM, FASTER * float(speed))
 
 
-def add(result: Result, work: Sequence[OwnRuns]) -> None:
+def add(result: Result, rows: list[OwnRunRow], is_requested: bool) -> None:
     """The rows, a check of each, and what is said of the worst start."""
-    order = ("worse", "fails", "alike", "calm")
-    for quantity, rows in work:
-        rows = sorted(rows, key=lambda row: (order.index(row.outcome), row.failed_at is None))
-        for row in rows:
-            note = f"{1e3 * row.dt:.4g} ms with {row.integrator}"
-            passed = row.outcome in ("alike", "calm")
-            result.check(
-                row.start, quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=About.STEP
-            )
-        result.tables.setdefault("own_run", []).extend(rows)
-        others = sum(row.outcome == rows[0].outcome for row in rows[1:])
-        requested = quantity == AT_REQUESTED
-        result.top.append(
-            result.finding("own_run", run=rows[0], requested=requested, others=others, calm=CALM)
-        )
+    rows.sort(key=lambda row: (ORDER.index(row.outcome), row.failed_at is None))
+    result.tables.setdefault("own_run", []).extend(rows)
+    quantity, about = AT_REQUESTED if is_requested else AT_OWN, About.STEP
+    for row in rows:
+        note, passed = f"{1e3 * row.dt:.4g} ms with {row.integrator}", row.outcome in ("alike", "calm")
+        result.check(row.start, quantity, 1 if passed else None, 1, "runs", note, rule="equal", about=about)
+    others = sum(row.outcome == rows[0].outcome for row in rows[1:])
+    result.top.append(
+        result.finding("own_run", run=rows[0], requested=is_requested, others=others, calm=CALM)
+    )

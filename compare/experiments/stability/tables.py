@@ -43,11 +43,9 @@ class LimitRow(OfMethod):
     @property
     def apart(self) -> float | None:
         """How far the observed limit is from the predicted one, relative; None if one of them is missing."""
-        return relative_difference(self.observed_dt, self.predicted_dt)
-
-
-def relative_difference(observed: float | None, predicted: float | None) -> float | None:
-    return abs(observed / predicted - 1.0) if observed and predicted else None
+        if not (self.observed_dt and self.predicted_dt):
+            return None
+        return abs(self.observed_dt / self.predicted_dt - 1.0)
 
 
 @dataclass(kw_only=True)
@@ -67,56 +65,22 @@ class DepartureRow(OfMethod):
 
 
 @dataclass(kw_only=True)
-class ClaimRow(Row):
-    """A run of one of the assignment's claims: stability_claims.csv has those of all three."""
+class ClaimRow(OfMethod):
+    """A run of one of the assignment's three claims: stability_claims.csv."""
 
     claim: int
-    scene: str
-    engine: str
-    method: str
     dt: float = time_step()
-
-    @property
-    def who(self) -> str:
-        return f"{LABELS[self.engine]} {self.method}"
-
-
-@dataclass(kw_only=True)
-class TorqueRow(ClaimRow):
-    """Claim 1: a run under one of the torques that hold the posture."""
-
-    claim: int = 1
-    torque: str
-    push: float = column("rad_per_s2")  # what the residual does to the fastest unstable mode
-    predicted: float | None = column("s")
+    torque: str = ""  # one of those that hold the posture
+    push: float | None = column("rad_per_s2", optional=True)  # of the residual, to the fastest unstable mode
+    predicted: float | None = column("s", optional=True)
     observed: float | None = column("s")
     direction: int | None
     moved: float | None = column("rad")
-
-
-@dataclass(kw_only=True)
-class FinerRow(ClaimRow):
-    """Claim 2: a run with the torque one ulp off."""
-
-    claim: int = 2
-    ulps: int
-    observed: float | None = column("s")
-    direction: int | None
-    moved: float | None = column("rad")
-    step: float | None = column("rad")
-    half_ulp: float = column("rad")
-
-
-@dataclass(kw_only=True)
-class KeptRow(ClaimRow):
-    """Claim 3: a run at the posture that is kept."""
-
-    claim: int = 3
-    torque: str
-    observed: float | None = column("s")
-    diverged_at: float | None = column("s")
-    moved: float | None = column("rad")
-    run: float = column("s")
+    ulps: int | None = column(optional=True)  # by which the torque is off
+    step: float | None = column("rad", optional=True)  # the largest dt |qd|
+    half_ulp: float | None = column("rad", optional=True)  # half a unit in the last place of that angle
+    diverged_at: float | None = column("s", optional=True)
+    run: float | None = column("s", optional=True)
 
 
 @dataclass(kw_only=True)
@@ -134,6 +98,28 @@ class OwnRunRow(Row):
     full_model_calm: bool
     finer_dt: float | None = column("s")
     finer_rms_speed: float | None
+
+
+@dataclass(kw_only=True)
+class ControlRow(Row):
+    """A controller at its own rate: control.csv. Limits are None where all that was tried is stable.
+
+    growth: in a period. longest_delay: 0 if it is not stable.
+    """
+
+    posture: str
+    integrator: str
+    period: float = column("s", digits=4)
+    delay: float = column("s", digits=4)
+    growth: float = column(digits=6)
+    grows_in_run: bool
+    longest_period: float | None = column("s", digits=4)
+    longest_delay: float | None = column("s", digits=4)
+    servos: int
+
+    @property
+    def is_stable(self) -> bool:
+        return self.growth <= 1.0
 
 
 @dataclass

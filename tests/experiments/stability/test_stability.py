@@ -11,11 +11,11 @@ import tmt
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
 from compare.engines.mujoco import reading
 from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
-from compare.engines.mujoco.linear import WholeRun
+from compare.engines.mujoco.step import WholeRun
 from compare.engines.tmt import Tmt
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
-from compare.experiments.stability import claims, departure, failure, limits, own_run
+from compare.experiments.stability import claims, departure, equilibria, limits, own_run
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.stability.held import held, posture_names
@@ -124,10 +124,10 @@ def test_the_clear_torques_push_as_much_as_sixteen_ulps(engines):
 
 
 def test_a_reset_is_caught(engines):
-    reset = failure.own_reset(FREE, engines)
+    reset = equilibria.own_reset(FREE, engines)
     assert reset.finite and reset.resets >= 1 and reset.caught <= reset.first_reset
     calm = ARM.case("hanging, free", posture="hanging")
-    assert failure.own_reset(calm, engines).resets == 0
+    assert equilibria.own_reset(calm, engines).resets == 0
 
 
 @pytest.mark.slow
@@ -203,4 +203,4 @@ def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step():
 def test_the_first_six_keyframes_are_run():
     keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
     rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
-    assert sorted(row.start for row in rows) == [f"k{i}" for i in range(own_run.MOST_STARTS)]
+    assert sorted(row.start for row in rows) == [f"k{i}" for i in range(own_run.MOST_POSTURES)]

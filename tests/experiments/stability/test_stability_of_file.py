@@ -11,9 +11,10 @@ from compare.engines.mujoco.names import INTEGRATORS
 from compare.engines.mujoco.reading import read
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
-from compare.experiments.stability import figures_growth, of_file
-from compare.experiments.stability.of_file import MODES, PUSHED, ControlRow, MotionRow
-from compare.stability.answer import StepLimitRow, posture_of
+from compare.experiments.stability import figures_stability, of_file
+from compare.experiments.stability.of_file import MODES, PUSHED
+from compare.stability.answer import StepLimitRow
+from compare.stability.place import posture_of, standing_at
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.05 0.05 0.05"/></body></worldbody><actuator>{actuator}</actuator>
@@ -61,14 +62,10 @@ def test_a_usual_push_is_survived_if_a_finer_step_survives_it(result, more, pass
 
 
 def test_the_robot_as_it_stands_is_judged_and_in_the_air_only_if_it_stands_nowhere(result):
-    air, lost = (
-        partial(step_row, surroundings="air", posture="air"),
-        step_row(limit="no_rest", stable_at_file_dt=None),
-    )
-    assert [
-        row.posture
-        for row in of_file.in_use([air(), step_row(posture="q"), step_row(predicted_dt=0.05)], "Euler")
-    ] == ["p", "q"]
+    air = partial(step_row, surroundings="air", posture="air")
+    lost = step_row(limit="no_rest", stable_at_file_dt=None)
+    rows = of_file.in_use([air(), step_row(posture="q"), step_row(predicted_dt=0.05)], "Euler")
+    assert [row.posture for row in rows] == ["p", "q"]
     assert of_file.in_use([air(), lost], "Euler")[0].posture == "air" and of_file.in_use([air()], "RK4") == []
     saddle = step_row(limit="saddle", stable_at_file_dt=None)
     assert of_file.in_use([air(), saddle], "Euler") == []
@@ -85,19 +82,14 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
     result = found_of()
     rows = result.tables["step_limits"]
     assert [(row.posture, row.integrator) for row in rows] == [("home", "Euler")]
-    assert (
-        rows[0].predicted_dt == pytest.approx(LIMIT, rel=3e-3)
-        and rows[0].observed_dt < LIMIT < rows[0].failing_dt
-    )
+    assert rows[0].predicted_dt == pytest.approx(LIMIT, rel=3e-3)
+    assert rows[0].observed_dt < LIMIT < rows[0].failing_dt
     assert result.checks and all(check.passed for check in result.checks) and not result.growth
     full = found_of(size=Setup.small)
-    assert [row.integrator for row in full.tables["step_limits"]] == [
-        name for name in INTEGRATORS if name != "implicit"
-    ]
-    assert (
-        full.growth["free"].keys() >= {"Euler", "RK4"}
-        and figures_growth.draw_growth(full)[0] == "stability_growth"
-    )
+    names = [row.integrator for row in full.tables["step_limits"]]
+    assert names == [name for name in INTEGRATORS if name != "implicit"]
+    assert full.growth["free"].keys() >= {"Euler", "RK4"}
+    assert figures_stability.draw_growth(full)[0] == "stability_growth"
     assert stability.headline(full).values["row"].integrator == "Euler"
 
 
@@ -106,10 +98,8 @@ def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
     failed = {check.quantity for check in result.checks if check.failed}
     assert AT_OWN_STEP in failed and AT_REQUESTED_STEP not in failed
     answers = [finding.values for finding in result.top if finding.kind == "answer"]
-    assert [(one["row"].stable_at_file_dt, one["requested"]) for one in answers] == [
-        (False, False),
-        (True, True),
-    ]
+    stable = [(answer["row"].stable_at_file_dt, answer["requested"]) for answer in answers]
+    assert stable == [(False, False), (True, True)]
     (cures,) = (note.values for note in result.notes if note.kind == "cures")
     assert {cure.change for cure in cures["cures"]} >= {"less_kv", "more_armature"}
 
@@ -120,8 +110,7 @@ def test_a_posture_that_is_asked_for_is_the_only_one():
         assert {row.posture for row in rows} == {asked}
     reading = read(TURNING.format(dt=0.002, actuator=MOTOR))
     asked = [
-        of_file.place_asked(posture_of(text, reading), reading).start[1]
-        for text in ("home", "57.29578", "spin")
+        standing_at(reading, posture_of(text, reading)).start[1] for text in ("home", "57.29578", "spin")
     ]
     assert asked == pytest.approx([0.1, 1.0, 0.0])
 
@@ -134,10 +123,8 @@ def test_a_program_at_its_own_rate_is_judged(actuator, gains):
         (row,) = result.tables["control"]
         assert (row.period, row.delay, row.servos) == (period, delay or 0.0, 1)
         assert row.is_stable is stable and row.grows_in_run is not stable
-        assert [check.passed for check in result.checks if "control period" in check.quantity] == [
-            stable,
-            True,
-        ]
+        passed = [check.passed for check in result.checks if "control period" in check.quantity]
+        assert passed == [stable, True]
         if delay is None:
             assert 0.012 < row.longest_period < 0.02
     result = found_of(MOTOR, control_period=0.02)
@@ -151,21 +138,3 @@ def test_a_motion_is_judged_by_what_its_step_adds():
     fails = found_of(dt=0.025, at_speed=True)
     assert [row.passed for row in fails.tables["motion_stability"]] == [False, False]
     assert sum(check.failed and check.quantity == "growth along its motion" for check in fails.checks) == 2
-
-
-def test_rows_have_the_names_of_their_units():
-    row = ControlRow(posture="p", integrator="Euler", period=0.02, delay=0.0, growth=1.0, grows_in_run=False,
-                     longest_period=None, longest_delay=None, servos=1)  # fmt: skip
-    assert {"period_s", "longest_delay_s"} <= row.record().keys() and row.is_stable
-    other = MotionRow(
-        posture="p",
-        integrator="Euler",
-        dt=0.02,
-        rate=1.0,
-        exact_rate=1.0,
-        lasts=1.0,
-        failed_at=None,
-        passed=True,
-    )
-    assert {"dt_s", "rate_per_s", "failed_at_s"} <= other.record().keys()
-    assert {"predicted_dt_s", "growth_rate_per_s"} <= step_row().record().keys()

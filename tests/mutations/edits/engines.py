@@ -10,7 +10,7 @@ EDITS = (
     ("engines.answer", "as_set", "all(_1)", "True", "other equations are said to be the same"),
     ("engines.answer", "cheapest_of", "row.worst_error <= target", "True", "a method that is not exact enough is the cheapest"),
     ("engines.outside", "OutsideDynamics.acting", "self.is_set", "True", "damping is that of the file, whatever was read"),
-    ("engines.outside.model", "ReadModel.lines", "np.cross(angular, linear)", "0.0", "an anchor is a point of the body"),
+    ("engines.outside.model", "movement", "moved.origin - turn @ link.origin", "moved.origin", "an anchor is a point of the body"),
     ("timing", "is_timed", "scatter(taken) <= STEADY", "True", "one disturbed call is a time"),
     ("engines.readings", "OF_BODIES", "('mass', 'moments')", "('moments',)", "a wrong mass is only listed"),
     ("engines.integrators", "compare_steps", "_1 * record.eps / EPS", "_1 * 1e9", "one step: tolerance x 1e9"),

@@ -19,7 +19,7 @@ EDITS = (
     ("robots.placement", "directions", "np.zeros((3, 3))", "np.eye(3)", "the anchor of a ball may be anywhere"),
     ("mujoco.welded", "join", "masses.sum()", "masses.max()", "the mass of one body is that of several", 1),
     ("mujoco.welded", "compiled", "not model.body_subtreemass[body]", "False", "a link may move without mass"),
-    ("mujoco.source", "compiled_without", "not bare and _1", "False", "neighbours touch where joints are locked"),
+    ("mujoco.locked", "compiled_without", "not bare and _1", "False", "neighbours touch where joints are locked"),
     ("parameters.contacts", "touches", "not dynamics.may_touch", "True", "nothing touches"),
     ("parameters.common", "common_factor", "is_common and _1", "_1", "any factor is a common one"),
     ("parameters.common", "alike", "is_near(_1, first.stated) and is_near(_2, first.compiled)", "True",

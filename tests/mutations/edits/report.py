@@ -80,4 +80,11 @@ EDITS = (
     ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
     ("reduction.times", "largest_gain", "max(smaller, *_1)", "min(smaller, *_1)", "the least gain is told as the best"),
+    # of a file's motion
+    ("reduction.search", "take_out", "trial if is_same else small", "trial", "what changes the motion is taken out"),
+    ("reduction.search", "best_within", "candidate.row.error <= allowed", "True", "any error is within what is allowed"),
+    ("reduction.search", "same_bits", "path.q.tobytes() == other.q.tobytes() and _1", "True", "every motion is the same"),
+    ("mujoco.motion", "couplings", "np.diag(inverse)", "1.0", "the prediction has no coupling through M"),
+    ("mujoco.motion", "Motion.controls", "_1 + EARLY", "_1 - EARLY", "a control acts a step too late"),
+    ("reduction.of_file", "add_checks", "apart(path, *_1)", "row.error", "the written file is not run"),
 )  # fmt: skip

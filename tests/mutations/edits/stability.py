@@ -25,7 +25,7 @@ EDITS = (
     ("own_run", "is_worse", "not finer.failed_at and not _1 <= _2", "False", "no run is unstable by its step"),
     ("own_run", "FASTER", "10.0", "1e3", "a run may be a thousand times as fast as at the finer step"),
     ("own_run", "add", "row.outcome in ('alike', 'calm')", "True", "what is not stable in its own run passes"),
-    ("own_run", "begin", "list(reading.keyframes)[:MOST_STARTS]", "list(reading.keyframes)[:1]", "one keyframe is run"),
-    ("own_run", "begin", "*setup.request.step", "*(reading.dt, reading.integrator)", "a requested step is the file's"),
-    ("failure", "check_reset", "run.first_reset is not None", "False", "no reset is looked at"),
+    ("own_run", "begin", "list(reading.keyframes)[:MOST_POSTURES]", "list(reading.keyframes)[:1]", "one keyframe is run"),
+    ("of_file", "begin", "Asked(*step, [step[1]])", "asked[0]", "a requested step is the file's"),
+    ("equilibria", "check_reset", "run.first_reset is not None", "False", "no reset is looked at"),
 )  # fmt: skip

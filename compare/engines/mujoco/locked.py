@@ -1,0 +1,126 @@
+"""A compiled model with some of its joints locked: they are not there, and all else is where they hold it."""
+
+from collections.abc import Mapping
+
+import mujoco
+import numpy as np
+
+from .inventory import contact_pairs
+from .names import aligns, element_name, joint_name, joint_places, kind_of, parts_of, rotors
+from .welded import compiled
+
+FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
+Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m or a quaternion
+
+
+def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> mujoco.MjModel:
+    """The model whose bodies and other joints are placed as mj_kinematics places them with the joints locked."""
+    model = compiled(spec)
+    data, places = mujoco.MjData(model), joint_places(model)
+    data.qpos[:] = model.qpos0
+    for name, place in places.items():
+        if name in positions or kind_of(model, place.joint) == "free":
+            data.qpos[place.qpos] = positions.get(name, (1.0, 0.0, 0.0, 0.0) if place.kind == "ball" else 0.0)
+    mujoco.mj_kinematics(model, data)
+    for joint in spec.joints:
+        joint.name = joint_name(model, joint.id)
+    numbers = {joint.name: joint.id for joint in spec.joints}  # a change of the spec takes them away
+    # a free joint goes as a whole, and the parts that stay are added
+    removed = {joint_name(model, places[name].joint) for name in positions}
+    moved = [body for body in spec.bodies if removed.intersection(joint.name for joint in body.joints)]
+    for body, number in [(body, body.id) for body in moved]:
+        axes = data.xmat[number].reshape(3, 3)
+        parent, quat = model.body_parentid[number], np.zeros(4)
+        mujoco.mju_mulQuat(quat, data.xquat[parent] * [1.0, -1.0, -1.0, -1.0], data.xquat[number])
+        body.set_frame(body.parent.add_frame())
+        body.alt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
+        body.pos = (data.xpos[number] - data.xpos[parent]) @ data.xmat[parent].reshape(3, 3)
+        body.quat = quat
+        for joint in list(body.joints):
+            i = numbers[joint.name]
+            if joint.name not in removed:
+                joint.set_frame(body.add_frame())
+                joint.pos, joint.axis = (data.xanchor[i] - data.xpos[number]) @ axes, data.xaxis[i] @ axes
+            elif kind_of(model, i) == "free":
+                armature = model.dof_armature + rotors(model)  # of actuators too, which are deleted
+                add_parts(body, joint, float(armature[model.jnt_dofadr[i]]), positions, axes)
+    clear(spec, removed, bare)
+    smaller = compiled(spec)
+    if not bare and (touching := pairs_of_bodies(smaller) - pairs_of_bodies(model)):
+        for body in spec.bodies:
+            body.name = element_name(smaller, "body", body.id)
+        # they are neighbours, whose contacts MuJoCo leaves out unless one of them is fixed
+        for pair in touching:
+            one, other = (element_name(smaller, "body", number) for number in pair)
+            spec.add_exclude(bodyname1=one, bodyname2=other)
+        smaller = compiled(spec)
+    # of springdamper the compiler chooses both by the inertia
+    for name, place in joint_places(smaller).items():
+        before = places[name]
+        smaller.qpos_spring[place.qpos] = model.qpos_spring[before.qpos]
+        smaller.dof_damping[place.dofs] = model.dof_damping[before.dofs]
+        smaller.jnt_stiffness[place.joint] = model.jnt_stiffness[before.joint]
+    return smaller
+
+
+def pairs_of_bodies(model: mujoco.MjModel) -> set[tuple[int, int]]:
+    """The bodies whose geoms may touch, by number, the smaller one first."""
+    pairs = np.sort(model.geom_bodyid[contact_pairs(model)], axis=1)
+    return set(map(tuple, pairs.tolist()))
+
+
+def add_parts(
+    body: mujoco.MjsBody, free: mujoco.MjsJoint, armature: float, locked: Positions, axes: np.ndarray
+) -> None:
+    """Add the parts of a free joint that are not locked. axes: of the body, as columns."""
+    if aligns(free):
+        why = "is aligned with the inertia of its body: none of its parts can be locked"
+        raise ValueError(f"free joint {free.name!r} {why}")
+    no_defaults = {"ref": 0.0, "springdamper": np.zeros(2), "limited": mujoco.mjtLimited.mjLIMITED_FALSE}
+    for name, kind, axis in zip(parts_of(free.name), PARTS_OF_FREE, [*axes, axes[2]]):
+        if name not in locked:
+            body.add_joint(name=name, type=kind, axis=axis, pos=np.zeros(3), armature=armature, **no_defaults)
+
+
+def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
+    """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
+    if bare:
+        delete_meshes(spec)
+    elements = [*spec.keys, *spec.sensors]
+    elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
+    for actuator in spec.actuators:
+        if actuator.target in removed or (bare and not actuator.armature):
+            elements.append(actuator)
+    elements += spec.tendons if bare else []
+    for element in (*elements, *[joint for joint in spec.joints if joint.name in removed]):
+        spec.delete(element)
+
+
+def delete_meshes(spec: mujoco.MjSpec) -> None:
+    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
+    elements = [*spec.sensors, *spec.tuples, *spec.pairs]
+    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
+    elements += [geom for geom in meshes if not gives_inertia(geom)]
+    for element in elements:
+        spec.delete(element)
+    used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
+    for asset in [asset for asset in (*spec.meshes, *spec.hfields) if asset.name not in used]:
+        spec.delete(asset)
+
+
+def gives_inertia(geom: mujoco.MjsGeom) -> bool:
+    """Whether the compiler takes mass of a body that moves from this geom."""
+    body = geom.parent
+    is_stated = body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
+    low, high = body.compiler.inertiagrouprange
+    has_mass = geom.mass != 0.0 and geom.density != 0.0 and low <= geom.group <= high
+    return has_mass and not is_stated and moves(body)
+
+
+def moves(body: mujoco.MjsBody) -> bool:
+    while body.name != "world":  # whose parent is no body, and in MuJoCo 3.10 not even none
+        if body.joints:
+            return True
+        body = body.parent
+    return False

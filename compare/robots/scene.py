@@ -1,0 +1,113 @@
+"""A scene: a motion of any robot, and the validation of what users give for it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+SEED = 10  # of every random number in a report
+MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
+TIMES = 1e-9, 1e6  # s, the shortest and the longest that is accepted
+TORQUES = ("free", "hold", "servos")
+
+
+class WrongField(ValueError):
+    """A field of a scene has a wrong value. accepted: what is expected instead."""
+
+    def __init__(self, scene: object, field: str, value: object, accepted: str):
+        named, shown = (shorten(" ".join(repr(part).split())) for part in (scene, value))
+        super().__init__(f"scene {named}: {field} is {shown}; expected {accepted}")
+        self.field, self.value, self.accepted = field, value, accepted
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is a finite real number; texts and booleans are not."""
+    try:
+        number = np.asarray(value)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
+
+
+def are_numbers(values: Any) -> bool:
+    """Whether a value is a sequence of finite real numbers."""
+    row = np.ndim(values) == 1 if isinstance(values, np.ndarray) else isinstance(values, tuple | list | range)
+    return row and all(is_number(value) for value in values)
+
+
+def is_each(value: Any) -> bool:
+    """Whether a value is a number, or a sequence of numbers that is not empty."""
+    return is_number(value) or (are_numbers(value) and np.size(value) > 0)
+
+
+def shorten(text: str, length: int = 60) -> str:
+    return text if len(text) <= length else text[: length - 4] + " ..."
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A motion of any robot under constant torque, or under constant controls of its actuators.
+
+    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute values
+    that would hide those of the file. Raises WrongField for values that no robot can have.
+    """
+
+    name: str
+    posture: str | tuple[float, ...] = ()  # name, or one number per joint, deg (m, quaternion); (): all zero
+    # "hold": balance of gravity and springs at the start; "servos": own actuators; or N m
+    torque: str | tuple[float, ...] = "free"
+    speed: tuple[float, ...] = ()  # deg/s (m/s) at the start; (): at rest
+    damping: float | tuple[float, ...] = 0.0  # N m s/rad (N s/m), added: of all joints, or of each speed
+    targets: float | tuple[float, ...] = 0.0  # deg (m), shift of the targets of the servos, all or each speed
+    gravity: bool = True  # that of the model, or none
+    locked: tuple[str, ...] = ()  # names of joints that keep their position
+    duration: float = 5.0  # s
+    dt: float = 5.0 / 64  # s, the largest step; all others divide it
+    judged: float | None = None  # s during which the band of rounding must be narrow; None: always
+    tags: tuple[str, ...] = ()  # see case.Robot
+
+    def __post_init__(self) -> None:
+        is_name = isinstance(self.name, str) and bool(self.name.strip()) and self.name.isprintable()
+        self.require("name", is_name, "a text in one line, not empty")
+        is_posture = isinstance(self.posture, str) or are_numbers(self.posture)
+        self.set("posture", is_posture, "the name of a posture, or numbers")
+        is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
+        self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
+        self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
+        for name in ("duration", "dt"):
+            is_time = is_number(getattr(self, name)) and TIMES[0] <= getattr(self, name) <= TIMES[1]
+            self.set(name, is_time, f"a time from {TIMES[0]:g} to {TIMES[1]:g} s")
+        accepted = "a number of at least 0 N m s/rad, or one for each joint"
+        self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
+        self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
+        self.require("targets", not np.any(self.targets) or self.torque == "servos", 'torque = "servos"')
+        self.require("gravity", isinstance(self.gravity, bool | np.bool_), "true or false")
+        object.__setattr__(self, "gravity", bool(self.gravity))
+        divides = abs(self.steps * self.dt - self.duration) <= 1e-9 * self.duration and self.steps >= 1
+        accepted = f"a step that divides {self.duration:g} s into at most {MAX_STEPS:,} steps"
+        self.require("dt", divides and self.duration / self.dt <= MAX_STEPS, accepted)
+        if self.judged is not None:
+            is_time = is_number(self.judged) and 0.0 <= self.judged <= self.duration
+            self.set("judged", is_time, f"a time in s of at most {self.duration:g}")
+        for name in ("locked", "tags"):
+            value = getattr(self, name)
+            is_names = isinstance(value, tuple | list) and all(isinstance(part, str) for part in value)
+            self.require(name, is_names, "a list of names")
+            object.__setattr__(self, name, tuple(dict.fromkeys(value)))
+
+    def require(self, name: str, is_right: bool, accepted: str) -> None:
+        """Raise WrongField for a field unless it is right."""
+        if not is_right:
+            raise WrongField(self.name, name, getattr(self, name), accepted)
+
+    def set(self, name: str, is_right: bool, accepted: str) -> None:
+        """Require that a field is right, and store its numbers as floats."""
+        self.require(name, is_right, accepted)
+        value = getattr(self, name)
+        if not isinstance(value, str):
+            object.__setattr__(self, name, tuple(map(float, value)) if np.ndim(value) else float(value))
+
+    @property
+    def steps(self) -> int:
+        """The number of steps of length dt."""
+        return round(self.duration / self.dt)
