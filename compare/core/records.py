@@ -19,7 +19,8 @@ class Experiment:
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
     needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
     options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
-    in_quick: bool = True  # whether a quick run of several experiments has it
+    # the most speeds of a robot for which a quick run of several experiments has it; None: any
+    quick_speeds: int | None = None
     timed: bool = False  # it measures times: it runs last, while nothing else does
     diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
     states_causes: bool = False  # its failing checks are the causes of the others

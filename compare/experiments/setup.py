@@ -1,6 +1,6 @@
 """The setup of an experiment: the robot, the engines, and the size of the run."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar, cast
@@ -23,6 +23,12 @@ def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
     """All engines by name; some may be unavailable. own: of a user's own equations."""
     schemes = [method.scheme for method in mujoco.methods.values()]
     return made(schemes, {"mujoco": mujoco} | ({"own": own} if own else {}))
+
+
+def different_first(cases: Sequence[Case]) -> list[Case]:
+    """The cases whose trees differ before others: their code compiles in parallel, and the others find it."""
+    trees = [case.tree for case in cases]
+    return sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
 
 
 def nothing(*_: Any) -> None:

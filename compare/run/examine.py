@@ -88,7 +88,8 @@ class Run:
             self.setup.robot.coordinates.nv > MOST_SPEEDS
         )  # the first answers come before any long work
         last = ("kinematics", *TIMED) if is_large else TIMED
-        self.order, self.early = sorted(self.names, key=last.__contains__), () if is_large else self.names
+        self.order = sorted(self.names, key=last.__contains__)
+        self.early = () if is_large else [name for name in self.names if not self.too_long(name)]
 
     def examined(self) -> Examined:
         (self.folder / "figures").mkdir()
@@ -123,8 +124,14 @@ class Run:
         is_needed = any(section.name in DIAGNOSED for section in differing)
         if len(self.names) > 1 and not EXPERIMENTS[name].compares and not is_needed:
             return block("run", "nothing_failed")
-        is_short = self.setup.is_quick and not self.setup.alone
-        return block("run", "not_quick") if is_short and not EXPERIMENTS[name].in_quick else ""
+        return self.too_long(name)
+
+    def too_long(self, name: str) -> str:
+        """Why an experiment is left out of a quick run of several; "" if it is not."""
+        most, robot = EXPERIMENTS[name].quick_speeds, self.setup.robot
+        if most is None or robot.coordinates.nv <= most or not self.setup.is_quick or self.setup.alone:
+            return ""
+        return block("run", "not_quick", name=name, most=most)
 
     def examine(self, name: str) -> None:
         self.clock.under_way = name

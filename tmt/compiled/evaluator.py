@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from .machine import Library
 
 POINTER, WHOLE = ctypes.c_void_p, ctypes.c_int64
-SMALL = 500  # states for which code of several side by side is not compiled
+SMALL = 500  # states that NumPy evaluates faster than code is compiled
+WIDE = 5_000  # evaluations beyond which code of several side by side is compiled, with the same bits
 SHARED = 5_000  # states times speeds from which several cores share them
 TOGETHER = 32  # states that are not parted
 
@@ -92,7 +93,7 @@ class Evaluator:
         count, n = len(q), len(self.tree.axis)
         arrays = [q, *rates]
         out = np.empty((count, self.size))
-        wide = count > SMALL or True in self.loops
+        wide = count > WIDE or True in self.loops
         self.loop(wide)  # is compiled once, before any thread asks for it
 
         def fill(part: slice) -> bool:

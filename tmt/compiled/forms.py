@@ -6,7 +6,7 @@ are shorter in the axes of the world (articulated.py).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from typing import TypeVar
 
 from tmt.derivation import articulated, composite, linearized
@@ -85,6 +85,19 @@ def all_dynamics(tree: AnyTree) -> list[Traceable]:
     return [*by_terms, Traceable(tree, articulated.mass_matrix_and_bias, by_bodies=True)]
 
 
+@lru_cache(maxsize=64)
+def dynamics_for(tree: Tree) -> list[Traceable]:
+    """The ways that are traced for slopes; of a large tree that to its accelerations which is the shortest."""
+    nq, n, every = tree.coordinates.nq, len(tree.axis), all_dynamics(tree)
+    if n <= DENSE:
+        return every
+
+    def length(dynamics: Dynamics) -> int:
+        return trace("acceleration", (nq, n, n), partial(dynamics.acceleration, tree)).length
+
+    return [min(every, key=length)]
+
+
 TreeOf = Callable[[Sequence[Values]], AnyTree]
 
 
@@ -140,7 +153,7 @@ def slope(tree: Tree, stepping: Method) -> Traced:
         return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
 
     nq, n = tree.coordinates.nq, tree.coordinates.nv
-    return shortest("slope", (nq, n, n, 1), function, all_dynamics(tree))
+    return shortest("slope", (nq, n, n, 1), function, dynamics_for(tree))
 
 
 def directional(tree: Tree, stepping: Method) -> Traced:
@@ -155,4 +168,4 @@ def directional(tree: Tree, stepping: Method) -> Traced:
         parts = [x[0].parts(value) for value in slopes]
         return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
-    return shortest("directional", (nq, n, n, 1, nq, n), both, all_dynamics(tree))
+    return shortest("directional", (nq, n, n, 1, nq, n), both, dynamics_for(tree))

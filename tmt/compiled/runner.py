@@ -11,6 +11,7 @@ from tmt.methods.stepping import Method
 from tmt.model.tree import Tree, checked_model
 
 from .cores import cores, in_threads
+from .evaluator import WIDE
 
 SPREAD = 20_000  # evaluations of the dynamics from which several cores share them
 PIECES = 4  # for each core, as one of them may be busy with something else
@@ -60,13 +61,14 @@ class Runner:
         count, steps = len(q), (q.shape[1] - 1) * every
         # side by side where every run does the same in each step
         is_uniform = not (self.stepping.adaptive or self.stepping.solves_stages)
-        width = lanes() if is_uniform and count >= lanes() else 1
+        evaluations = steps * count * self.stepping.stages
+        width = lanes() if is_uniform and count >= lanes() and evaluations > WIDE else 1
         info = np.zeros((count, 3), np.int64)
 
         def follow_some(part: slice) -> None:
             self.call(width, [array[part] for array in (q, qd, tau, info)], dt, tolerance, every)()
 
-        threads = cores() if count > width and steps * count * self.stepping.stages > SPREAD else 1
+        threads = cores() if count > width and evaluations > SPREAD else 1
         parts = min(count // width, PIECES * threads) if threads > 1 else 1
         in_threads(follow_some, count, parts, width, threads)
         return self.outcome(q, qd, info, every)

@@ -1,6 +1,7 @@
 """MuJoCo as an engine: a compiled model, what a case changes in it, and its actuators under constant controls."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from typing import Any
 
 import mujoco
@@ -67,12 +68,15 @@ class Mujoco(Engine):
     methods = METHODS
 
     def __init__(self, source: Source, bodies: Sequence[int], tree: Tree | None = None) -> None:
-        self.source, self.model, self.bodies = source, source.model, list(bodies)
-        self.methods, self.bare = methods_for(tree), tree is not None
+        self.source, self.bodies, self.methods = source, list(bodies), methods_for(tree)
+        self.bare = tree is not None
+        self.model = source.without_meshes() if self.bare else source.model
         self.cache: dict[tuple[object, ...], MujocoDynamics] = {}
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"cache": {}}
+        source = copy(self.source)
+        source.model = self.model  # without meshes, which another process needs no more than this engine
+        return self.__dict__ | {"cache": {}, "source": source}
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         return methods_for(case.tree) if case.controller else self.methods

@@ -85,18 +85,42 @@ def add_parts(
 
 def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
     """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
+    if bare:
+        delete_meshes(spec)
     elements = [*spec.keys, *spec.sensors]
     elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
     for actuator in spec.actuators:
         if actuator.target in removed or (bare and not actuator.armature):
             elements.append(actuator)
-    if bare:
-        elements += [*spec.tendons, *spec.tuples, *spec.pairs]
-        for body in spec.bodies:
-            if body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS:
-                elements += body.geoms
+    elements += spec.tendons if bare else []
     for element in (*elements, *[joint for joint in spec.joints if joint.name in removed]):
         spec.delete(element)
+
+
+def delete_meshes(spec: mujoco.MjSpec) -> None:
+    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
+    elements = [*spec.sensors, *spec.tuples, *spec.pairs]
+    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
+    elements += [geom for geom in meshes if not gives_inertia(geom)]
+    for element in elements:
+        spec.delete(element)
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
-    for asset in [asset for asset in (*spec.meshes, *spec.hfields) if bare and asset.name not in used]:
+    for asset in [asset for asset in (*spec.meshes, *spec.hfields) if asset.name not in used]:
         spec.delete(asset)
+
+
+def gives_inertia(geom: mujoco.MjsGeom) -> bool:
+    """Whether the compiler takes mass of a body that moves from this geom."""
+    body = geom.parent
+    is_stated = body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
+    low, high = body.compiler.inertiagrouprange
+    has_mass = geom.mass != 0.0 and geom.density != 0.0 and low <= geom.group <= high
+    return has_mass and not is_stated and moves(body)
+
+
+def moves(body: mujoco.MjsBody) -> bool:
+    while body.name != "world":  # whose parent is no body, and in MuJoCo 3.10 not even none
+        if body.joints:
+            return True
+        body = body.parent
+    return False

@@ -18,7 +18,7 @@ from xml.etree import ElementTree
 import mujoco
 
 from ...process.parts import is_pipe, named_by
-from .locked import FROM_GEOMS, Positions, compiled_without
+from .locked import FROM_GEOMS, Positions, compiled_without, delete_meshes, gives_inertia
 from .welded import compiled, join, welded_bodies
 
 # by MuJoCo, of a mesh that is not there or in another format
@@ -137,11 +137,23 @@ class Source:
         join(other.model, other.welded)
         return other
 
+    def without_meshes(self) -> mujoco.MjModel:
+        """The compiled model for what touches nothing: meshes are nearly all of its memory, and every copy copies them."""
+        if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
+            return self.model
+        if self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
+            return self.model
+        spec = without_visuals(self.spec)
+        delete_meshes(spec)
+        model = compiled(spec)
+        join(model, self.welded)
+        return model
+
     def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
         """The compiled model without the joints named in `positions`, see names.joint_places.
 
         Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a locked
-        joint; bare: all tendons, equalities and geoms without mass, and all actuators except those with armature.
+        joint; bare: all tendons, equalities and meshes, and all actuators except those with armature.
         ModelError if anything else refers to a locked joint, or nothing is stated.
         """
         names = ", ".join(positions)
@@ -233,25 +245,14 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
     names = {asset.name: asset.file for asset in assets}
     geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]
     for geom in geoms:
-        body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
-        is_stated = body.explicitinertial and body.compiler.inertiafromgeom != FROM_GEOMS
-        low, high = body.compiler.inertiagrouprange
-        has_mass = geom.mass != 0.0 and geom.density != 0.0 and low <= geom.group <= high
-        if has_mass and not is_stated and moves(body):
-            of_mesh = f"the inertia of body {body.name!r} is that of its mesh {file}"
-            raise ValueError(f"{of_mesh}, which cannot be read")
+        if gives_inertia(geom):
+            body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
+            why = f"is that of its mesh {file}, which cannot be read"
+            raise ValueError(f"the inertia of body {body.name!r} {why}")
     deleted = {geom.name for geom in geoms} - {""}
     pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & deleted]
     for element in (*pairs, *geoms, *assets):
         spec.delete(element)
-
-
-def moves(body: mujoco.MjsBody) -> bool:
-    while body.name != "world":  # whose parent is no body, and in MuJoCo 3.10 not even none
-        if body.joints:
-            return True
-        body = body.parent
-    return False
 
 
 def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:

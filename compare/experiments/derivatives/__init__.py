@@ -29,7 +29,7 @@ from . import ways
 from .subjects import all_subjects, dynamics_of
 from .ways import EXACT, FORWARD, ContactRow, CostRow, DerivativeRow, DerivativesResult, Measured, Task
 
-EXPERIMENT = Experiment(order=105, serves_own=False, timed=True)
+EXPERIMENT = Experiment(order=105, serves_own=False, timed=True, quick_speeds=8)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
 FEW_SPEEDS = 8  # of a robot with all integrators: of others they take minutes
 INTEGRATORS = "Euler", "implicitfast", "implicit", "discrete", "RK4"

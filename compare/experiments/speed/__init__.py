@@ -12,7 +12,7 @@ from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...truth.reference import LOST, has_no_reference
 from .. import Experiment
-from ..setup import Setup
+from ..setup import Setup, different_first
 from . import conclusions, evaluations
 from .runs import FIRST_STEPS, SceneRuns, SpeedResult, SpeedRow, prepared, runs_of, scene_runs, take_times
 from .settings import followed, left_out, regular_of, scenes_of
@@ -33,11 +33,7 @@ def skipped(robot: Robot) -> Finding | None:
 def begin(setup: Setup) -> Iterable[SceneRuns]:
     """Start measuring the errors of MuJoCo and tmt, in parallel with other work: they are timed later."""
     cases = followed(setup.robot, setup.size)
-    trees = [case.tree for case in cases]
-    # different trees come first: their code compiles in parallel
-    different_first = sorted(cases, key=lambda case: trees[: cases.index(case)].count(case.tree))
-    measure = partial(scene_runs, engines=setup.engines, size=setup.size)
-    return setup.map(measure, different_first)
+    return setup.map(partial(scene_runs, engines=setup.engines, size=setup.size), different_first(cases))
 
 
 def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:

@@ -17,13 +17,14 @@ from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import RECORDS, Reference, reference
 from .. import Experiment
-from ..setup import Setup
+from ..setup import Setup, different_first
 from . import errors, motion
 from .runs import TrajectoryResult, follow, recorded
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
+FEW_SPEEDS = 8  # up to which a quick run of several experiments has all integrators in every scene
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 SHOWN = ["scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
          "judged_until_s", "required_s", "diverged_at_s", "twin_diverged_at_s"]  # fmt: skip
@@ -54,10 +55,19 @@ def begin(setup: Setup) -> Work:
     # a file's robot has scenes with steps of their own
     fast = [] if robot.is_read else [case for case in cases if "speed" in case.scene.tags]
     true = [case for case in fast if case.steps == RECORDS]
+    cases = different_first(cases)
     steps = setup.of(errors.STEPS, errors.FEW_STEPS, errors.FEW_STEPS)
-    runs = spread(partial(follow, engines=engines, finer=finer), cases)
+    runs = spread(partial(follow, engines=engines, finer=finer, few=few_integrators(setup)), cases)
     drifts = spread(partial(errors.measure_energy, engines=engines, steps=steps), [robot])
     return Work(runs, drifts, [case.name for case in true], spread(reference, true), left_out)
+
+
+def few_integrators(setup: Setup) -> list[str]:
+    """RK4 and the file's own, for a large robot in a quick run of several experiments; [] for all integrators."""
+    is_short = setup.is_quick and not setup.alone
+    if setup.reading is None or not is_short or setup.robot.coordinates.nv <= FEW_SPEEDS:
+        return []
+    return sorted({"RK4", setup.reading.integrator})
 
 
 def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[Finding]]:
@@ -94,6 +104,8 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
     result.notes += work.left_out
+    if few := few_integrators(setup):
+        result.find("few_integrators", integrators=few, speeds=FEW_SPEEDS)
     return result
 
 

@@ -15,10 +15,13 @@ from ...engines import LABELS, Dynamics, Engine, Method, Motion, compared, metho
 from ...judge import run as rules
 from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
+from ...robots.coordinates import rates_at
 from ..followed import Deviation, check_closest, differences, one_step
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time
+# decay rate times dt up to which RK4 is stable: beyond, each stage multiplies the rounding of the one before
+FASTEST = 2.785
 RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 
 
@@ -145,14 +148,20 @@ def recorded(case: Case) -> int:
     return count
 
 
-def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
-    """One case with every scheme that both engines have. finer: multiples of the scene's own steps."""
+def follow(
+    case: Case, engines: Mapping[str, Engine], finer: Sequence[int], few: Sequence[str] = ()
+) -> TrajectoryResult:
+    """One case with every scheme that both engines have. finer: multiples of the scene's own steps.
+
+    few: MuJoCo's integrators for a scene whose errors are not regular; (): all.
+    """
     first, mujoco = case.robot.compared
     result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
     available = {method.scheme for method in methods_in(engines[first], case).values()}
+    chosen = () if "regular" in case.scene.tags else few
     schemes: dict[str, list[Method]] = {}
     for method in methods_in(engines[mujoco], case).values():
-        if method.scheme in available:
+        if method.scheme in available and (not chosen or method.name in chosen):
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
@@ -173,10 +182,12 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     alive = motion.t[::every] < ends_first([path.ended])
     states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
     stepped = one_step(dynamics, states, tau, dt, scheme)
-    # the bound of a step's rounding is of first order in dt: too small beyond half a turn of a joint
+    # the bound of a step's rounding is of first order in dt: too small beyond half a turn of a joint, and
+    # where several stages are not stable
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
-    single = dt * rates.max(axis=1, initial=0.0) <= np.pi
+    is_slow = stepping.stages == 1 or dt * max(rates_at(tree, case.q)) <= FASTEST
+    single = is_slow & (dt * rates.max(axis=1, initial=0.0) <= np.pi)
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
     of_positions = width[:, : case.coordinates.nv].max(axis=1)
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)

@@ -23,7 +23,7 @@ EDITS = (
     ("forms", "shortest", "min(_1, key=_2)", "max(_1, key=_2)", "the form with the most operations is taken"),
     ("straight", "places_handed_on", "last.get(i, k) > k", "last.get(i, k) > k + 1", "a part lacks values of the one before"),
     ("trigonometry", "Ring.count", "self.work > self.limit", "False", "symbolic work has no limit"),
-    ("mujoco.source", "leave_out", "has_mass and not is_stated and moves(body)", "False", "a missing mesh may have the inertia"),
+    ("mujoco.locked", "gives_inertia", "has_mass and not is_stated and moves(body)", "False", "a mesh may have the inertia"),
     ("mujoco.source", "parsed", "floating and not is_urdf(text)", "False", "--floating says nothing of MJCF"),
     ("forms", "directional", "(slope for _, slope in parts)", "(2 * slope for _, slope in parts)", "the Jacobian x 2"),
     ("stepping", "Implicit.acts_at_single_joints", "not self.bias_rows", "True", "an implicit bias counts as armature"),
