@@ -21,7 +21,16 @@ from compare.experiments.setup import Setup, engines
 from compare.run import examine as experiment
 from compare.run.reference import compared_with
 
-OTHERS = ["parameters", "published", "kinematics", "engines", "speed", "stability", "derivatives", "reduction"]
+OTHERS = [
+    "parameters",
+    "published",
+    "kinematics",
+    "engines",
+    "speed",
+    "stability",
+    "derivatives",
+    "reduction",
+]
 STATIC = ["mass", "gravity", "acceleration"]
 
 

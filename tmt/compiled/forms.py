@@ -92,7 +92,7 @@ def dynamics_for(tree: Tree) -> list[Traceable]:
     if n <= DENSE:
         return every
 
-    def length(dynamics: Dynamics) -> int:
+    def length(dynamics: Dynamics) -> float:
         return trace("acceleration", (nq, n, n), partial(dynamics.acceleration, tree)).length
 
     return [min(every, key=length)]
