@@ -54,7 +54,7 @@ def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
 
 def columns(model: mujoco.MjModel, whole: mujoco.MjModel, places: Places) -> tuple[Array, Array]:
     """Where the joints or actuators of a model are in the vectors of the whole model, as in joints or actuators."""
-    among, first, second = places(whole), [], []
+    among, first, second = places(whole), list[int](), list[int]()
     for name in places(model):
         for numbers, place in zip((first, second), among[name]):
             numbers += range(place.start, place.stop)
