@@ -39,7 +39,8 @@ def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
         choices, scene = [], f"{' and '.join(locked)} locked"
         for _ in range(angles):  # at which they are locked
             q, v = coordinates.random(rng, states), rng.uniform(-10.0, 10.0, (states, coordinates.nv))
-            case = robot.case(scene, posture=tuple(q[0] / degree), locked=locked)
+            posture = np.where(degree == 1.0, q[0], np.degrees(q[0]))
+            case = robot.case(scene, posture=tuple(posture), locked=locked)
             choices.append(sub_block_differences(setup, case, q, v))
         for quantity, pair in choices[0]:
             apart, scale = np.concatenate([choice[quantity, pair] for choice in choices], axis=1)
