@@ -17,18 +17,18 @@ LONG = 0.25  # s: a turn of another process, some 16 ms, does not change a call 
 WIDTHS = (("avx512f", "AVX-512"), ("avx2", "AVX2"), ("asimd", "NEON"), ("sse2", "SSE2"))
 
 
-def in_turns(runs: Sequence[Call], rounds: int, clock: Clock = time.perf_counter) -> list[list[float]]:
+def in_turns(runs: Sequence[Call], rounds: int, clock: Clock | None = None) -> list[list[float]]:
     """Seconds of each call of each function, at most `rounds` calls, after one to warm up short functions.
 
     A function is called again until `is_timed`: one call may have had to wait for another process.
     """
-    times: list[list[float]] = [[] for _ in runs]
+    now, times = clock or time.perf_counter, [list[float]() for _ in runs]
     for k in range(rounds + 1):
         for run, taken in zip(runs, times):
             if not is_timed(taken):
-                begin = clock()
+                begin = now()
                 run()
-                taken.append(clock() - begin)
+                taken.append(now() - begin)
                 if k == 0 and taken[0] < WARM:
                     taken.clear()
     return times
@@ -49,7 +49,7 @@ def scatter(taken: Sequence[float]) -> float:
     return next_fast / fast
 
 
-def fastest(runs: Mapping[Name, Call], rounds: int, clock: Clock = time.perf_counter) -> dict[Name, float]:
+def fastest(runs: Mapping[Name, Call], rounds: int, clock: Clock | None = None) -> dict[Name, float]:
     return {name: min(taken) for name, taken in zip(runs, in_turns(list(runs.values()), rounds, clock))}
 
 

@@ -19,6 +19,7 @@ from compare.robots.arm import ARM, PRINTED
 from compare.robots.states import Sample
 from compare.run.examine import Setup
 from tmt import literal
+from tmt.exact.many import Pairs
 
 OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of both engines that fail
     (kinematics, "com_positions", {}, {"x_b"}), (kinematics, "angular_velocities", {}, {"omega_b"}),
@@ -164,7 +165,8 @@ def of_item(name, ours=0.0, theirs=0.0, scale=0.0, exactly=0.0, printed=True):
     item, result = ITEMS[name], Result("published")
     value = np.array(item.values)
     truth = value + exactly if printed else np.zeros_like(value)
-    answer = published.Answer(truth.astype(object), truth + ours, truth + theirs, scale)
+    exact = Pairs(truth[None], np.zeros_like(truth)[None])
+    answer = published.Answer(exact, truth + ours, truth + theirs, scale)
     published.check_answer(result, item, answer, ARM.joints)
     return verdicts(result)
 
