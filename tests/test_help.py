@@ -99,11 +99,11 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     """With few states, on a small robot with a servo; a fleet has the arm's file and a wrong one."""
     monkeypatch.chdir(tmp_path)
     own_equations.write(tmp_path)
-    servo = '<actuator><position joint="hip" kp="20" kv="1"/></actuator></mujoco>'
+    servo = '<actuator><position name="hip" joint="hip" kp="20" kv="1"/></actuator></mujoco>'
     mine, arm = (path.read_text(encoding="utf-8") for path in (Path("mine.py"), ARM.mjcf))
     files = dict.fromkeys(FILES_OF_ARM, arm) | {"submissions/b.xml": arm.replace('mass="1.5"', 'mass="1.6"')}
     files |= {"robot.xml": own_equations.XML.replace("</mujoco>", servo), "my_equations.py": mine + POSITIONS}
-    files |= {"points.toml": "mass = 5\n"}
+    files |= {"points.toml": "mass = 5\n", "recorded.csv": "time,hip\n0,0\n0.5,0.1\n1,0\n"}
     for name, text in (files | {"my.toml": blocks("toml")[0]}).items():
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_text(text, encoding="utf-8")

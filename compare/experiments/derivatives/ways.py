@@ -22,7 +22,7 @@ from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
 from ...judge.agree import share_of
 from ...judge.entries import Entries
-from ...judge.rounding import of_positions
+from ...judge.rounding import LEFT_OUT, of_positions
 from ...judge.scale import EPS, FACTOR, gain_scale
 from .subjects import Subject, dynamics_of
 
@@ -267,7 +267,7 @@ def measured(task: Task, mujoco: Mujoco, dt: float) -> list[Measured]:
             name = same[0].name
             rows += [row(name, eps, values[eps]) for eps in SIZES]
             if same[0].centred:
-                shares[name] = share_of_differences(values, exact, subject, dt)
+                shares[name] = share_of_differences(values, exact, subject, quantity, dt)
         result.append(Measured(subject, quantity, rows, shares))
     return result
 
@@ -293,19 +293,28 @@ def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
     return float(share_of(exact.distance(values), tolerance).max())
 
 
-def share_of_differences(values: Mapping[float, Array], exact: Pairs, subject: Subject, dt: float) -> float:
+def share_of_differences(
+    values: Mapping[float, Array], exact: Pairs, subject: Subject, quantity: Quantity, dt: float
+) -> float:
     """The largest share, over eps and entries, of what rounding and truncation can make a centred difference off.
 
     Rounding: 64 eps of what a step adds, there and carried through the step, over the eps of the difference; a
     ball's turn is a quaternion, as in judge.rounding. Truncation: twice the term in eps^2, from ten times eps.
+    Of discrete with servos at rest also the force that MuJoCo leaves out, over the eps of the difference.
     """
     entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
     force = entries.force(subject.tau) + gain_scale(subject.tree, subject.q, subject.qd)
     rates = np.abs(subject.qd) + dt * entries.acceleration(force, qdd)
     sizes = np.concatenate([of_positions(subject.tree, subject.q) + dt * rates, rates], axis=1)[:, :, None]
     sizes = sizes + np.abs(exact.high[:, :, : sizes.shape[1]]) @ sizes
+    left_out = np.zeros_like(sizes)
+    if quantity.integrator == "discrete" and subject.tree.has_gains:
+        total = np.einsum("sij,sj->si", tmt.mass_matrix(subject.q, subject.tree), qdd)
+        at_rest = np.linalg.norm(total, axis=1, keepdims=True) < 4.0 * LEFT_OUT
+        rates = dt * LEFT_OUT * entries.inverse.sum(axis=2) * at_rest
+        left_out = np.concatenate([dt * rates, rates], axis=1)[:, :, None]
     shares = []
     for coarse, eps in pairwise(SIZES):
         truncated = TRUNCATED * np.abs(values[coarse] - values[eps])
-        shares.append(largest_share(exact, values[eps], FACTOR * EPS * sizes / eps + truncated))
+        shares.append(largest_share(exact, values[eps], (FACTOR * EPS * sizes + left_out) / eps + truncated))
     return max(shares)

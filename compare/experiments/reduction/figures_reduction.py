@@ -33,7 +33,9 @@ def draw_frontier(result: ReductionResult, rows: Sequence[FrontierRow]) -> tuple
     for name, mark in marks.items():
         handles.append(Line2D([], [], color="black", linestyle="none", marker=mark, label=name))
     fig.legend(handles=handles, loc="outside right upper", fontsize=7)
-    ax.set(xscale="log", yscale="log", xlabel="error, rad or m", ylabel="time for a second of motion, s")
+    smallest = min((row.error for row in rows if row.error > 0.0), default=1.0)
+    ax.set_xscale("symlog", linthresh=smallest / 10.0)  # models without an error are shown too
+    ax.set(yscale="log", xlabel="error, rad or m", ylabel="time for a second of motion, s")
     return "reduction_frontier", fig, result.finding("frontier", "reduction_of_file")
 
 
