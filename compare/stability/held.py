@@ -224,7 +224,7 @@ def growth_of(stepping: Tableau, z: np.ndarray) -> np.ndarray:
         return 1.0 + z * sum(b * stage for b, stage in zip(stepping.b, stages))
     size = len(stepping.b)
     coupled = np.eye(size) - z[..., None, None] * np.array(stepping.A)
-    return 1.0 + z * (np.linalg.solve(coupled, np.ones((size, 1)))[..., 0] @ np.array(stepping.b))
+    return 1.0 + z * (np.linalg.solve(coupled, np.ones((*z.shape, size, 1)))[..., 0] @ np.array(stepping.b))
 
 
 # forces at rest over any scalar, and their derivatives
