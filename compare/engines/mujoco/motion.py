@@ -112,7 +112,7 @@ class Path(NamedTuple):
         return self.q[:: max(1, len(self.q) // SAMPLES)]
 
     def points(self, names: Iterable[str], every: int) -> Array:
-        """Of sites each so many steps, (times, sites, 3) m."""
+        """Of sites, after every given number of steps, (times, sites, 3) m."""
         data, places = mujoco.MjData(self.model), []
         for q in self.q[::every]:
             data.qpos[:] = q

@@ -125,7 +125,7 @@ def frontier(
 ) -> list[Candidate]:
     """Each model by each integrator and step: its error against the reference, and its time; the file as it is first.
 
-    Left out are those that are worse than all of the errors, but for the file's own step.
+    Those that are worse than all of the errors are left out; the file's own step stays.
     """
     sets = {frozenset(range(count)) for count in range(min(FEW, len(locks.groups)) + 1)}
     sets |= {locks.within(error) for error in errors}
