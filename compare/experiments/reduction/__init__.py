@@ -18,7 +18,7 @@ from .. import Experiment
 from ..setup import Setup, nothing
 from . import of_file
 from .exact_motion import compare_swing, is_pendulum
-from .needs import compare_case, largest_gain, time_models
+from .needs import compare_case
 from .records import Need, ReductionResult
 from .sub_blocks import compare_blocks
 
@@ -28,7 +28,6 @@ EXPERIMENT = Experiment(
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
     timed=True,
 )
-NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:
@@ -38,7 +37,7 @@ def claim_values(robot: Robot) -> dict[str, str | float]:
 
 
 def begin(setup: Setup) -> Iterable[ReductionResult]:
-    """Start everything that is not timed, in parallel with other work."""
+    """Start all but the motion of a file, in parallel with other work."""
     alone = replace(setup, map=map, quiet=nothing, progress=nothing, reading=None)
     return setup.map(untimed, [alone])
 
@@ -48,15 +47,6 @@ def rows(setup: Setup, work: Iterable[ReductionResult] | None = None) -> Reducti
     (result,) = begin(setup) if work is None else work
     if setup.alone and setup.reading and not setup.robot.is_stated:
         of_file.add(result, setup, setup.reading)
-    if result.models:
-        setup.quiet()
-        time_models(result, setup, rounds=setup.of(64, 16, 2))
-        best = largest_gain(result.rows, setup.robot.coordinates.nv)
-        if best and (best.speedup or 0.0) >= NO_GAIN:
-            joints = best.hinges.split()
-            result.headline = result.finding(
-                "headline", speedup=best.speedup, joints=joints, scene=best.scene
-            )
     result.top += answers(result, setup.robot)
     return result
 
@@ -74,7 +64,7 @@ def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
 
 
 def untimed(setup: Setup) -> ReductionResult:
-    """The parts of `rows` that are not timed, and the models to be timed."""
+    """All but the motion of a file, whose runs are timed."""
     result, robot = ReductionResult("reduction"), setup.robot
     if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
         result.find("driven", scenes=driven)
@@ -83,7 +73,7 @@ def untimed(setup: Setup) -> ReductionResult:
             compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
         for case in robot.cases_of_torque:
             if not robot.is_read:
-                result.models += compare_case(result, case, setup)
+                compare_case(result, case, setup)
             if is_pendulum(case):
                 compare_swing(result, setup, case)
     except ModelError as error:

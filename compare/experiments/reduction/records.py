@@ -4,23 +4,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ...core.check import Result
-from ...core.rows import MOVEMENT, MovementRow, Row, column
-from ...robots.case import Case
-
-
-@dataclass(kw_only=True)
-class ReductionRow(MovementRow):
-    """The time of an RK4 step of a model in an engine."""
-
-    scene: str
-    hinges: str = column(names=True)
-    engine: str
-    nv: int
-    operations: int | None
-    ns_per_step: float | None = None
-    speedup: float | None = None  # relative to the whole model
-    max_difference: float | None = column(MOVEMENT, default=None)  # from the whole model
-    integrator: str = "RK4"
+from ...core.rows import Row, column
 
 
 @dataclass
@@ -126,9 +110,6 @@ class FrontierRow(Row):
     best_for: str = ""
 
 
-Model = tuple[str, Case | None]  # the name of a scene, and what is run; None: nothing moves
-
-
 class Need(NamedTuple):
     """The joints of a scene."""
 
@@ -145,7 +126,6 @@ class Swing(NamedTuple):
 
 @dataclass
 class ReductionResult(Result):
-    models: list[Model] = field(default_factory=list)  # that are timed
     needs: dict[str, Need] = field(default_factory=dict)  # by scene
     apart: dict[tuple[str, str], float] = field(default_factory=dict)  # by scene and engine, rad or m
     swings: dict[str, Swing] = field(default_factory=dict)  # by scene

@@ -79,7 +79,6 @@ EDITS = (
     ("figures_runs", "draw_held", "result.errors[name]", "_0[::-1]", "the caption exchanges the engines"),
     ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
-    ("reduction.needs", "largest_gain", "max(smaller, *_1)", "min(smaller, *_1)", "the least gain is told as the best"),
     # of a file's motion
     ("reduction.search", "take_out", "trial if is_same else small", "trial", "what changes the motion is taken out"),
     ("reduction.search", "answer_within", "row.error <= allowed", "True", "any error is within what is allowed"),
