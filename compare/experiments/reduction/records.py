@@ -61,12 +61,16 @@ class FreeRow(Row):
 
 @dataclass
 class JointRow(Row):
-    """How far a joint moved, rad or m, and how far it would move another one if it were locked; None: it is not to be."""
+    """How far a joint moved, rad or m. None: it is not to be locked.
+
+    predicted: how far it would move another one if it were locked; error_alone: the error of its lock in a run.
+    """
 
     joint: str
     moved: float
-    predicted: float | None
-    locked: bool
+    predicted: float | None = None
+    error_alone: float | None = None
+    locked: bool = False
 
 
 @dataclass
@@ -80,13 +84,18 @@ class PairRow(Row):
 
 @dataclass
 class LimitRow(Row):
-    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv."""
+    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv, or rests_elsewhere.
+
+    apart: the largest difference of a joint at the rest, just below the limit, from that of the whole file, rad or m.
+    """
 
     model: str
     integrator: str
     limit: str
-    step: float | None = column("s", digits=4)
+    step: float | None = column("s", digits=4, default=None)
     joint: str = ""
+    apart: float | None = None
+    apart_joint: str = ""
 
 
 @dataclass(kw_only=True)
