@@ -178,10 +178,9 @@ def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, f
 
 def apart(paths: Sequence[Path], others: Sequence[Path], points: Iterable[str] = ()) -> float:
     """How far the paths of a model are from those of another one, rad or m; inf where one of them fails."""
-    largest = max(
-        movement for pair in zip(paths, others) for movement in [0.0, *movements(*pair, points).values()]
-    )
-    return largest if np.isfinite(largest) else np.inf
+    largest = [list(movements(*pair, points).values()) for pair in zip(paths, others)]
+    error = float(np.max(largest, initial=0.0))  # a NaN stays one
+    return error if np.isfinite(error) else np.inf
 
 
 @dataclass

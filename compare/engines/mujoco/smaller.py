@@ -62,14 +62,14 @@ class Smaller:
     def write(self, path: File, comment: str) -> None:
         """Write the file, by MuJoCo with six digits; its meshes and height fields are copied into a folder beside it."""
         spec, origin = self.spec.copy(), File(self.spec.modelfiledir or ".").absolute()
-        folder, files = assets_of(path), [asset for asset in (*spec.meshes, *spec.hfields) if asset.file]
-        for number, asset in enumerate(files):
+        folder = assets_of(path)
+        for number, asset in enumerate(files_of(spec)):
             name = File(asset.file).name
             places = origin / spec.meshdir / asset.file, origin / spec.meshdir / name, origin / asset.file
             folder.mkdir(exist_ok=True)
             asset.name = asset.name or File(asset.file).stem
             asset.file = f"{folder.name}/{number} {name}"
-            copyfile(next(place for place in places if place.is_file()), path.parent / asset.file)
+            copyfile(next(filter(File.is_file, places), places[0]), path.parent / asset.file)
         spec.comment = comment.replace("--", "- -")  # which XML does not allow
         spec.modelfiledir, spec.meshdir, spec.strippath = str(path.absolute().parent), "", False
         spec.texturedir = str(origin / spec.texturedir) if spec.textures else ""
@@ -77,6 +77,11 @@ class Smaller:
             warnings.simplefilter("ignore")
             compiled(spec)
             path.write_text(spec.to_xml(), encoding="utf-8")
+
+
+def files_of(spec: mujoco.MjSpec) -> list[mujoco.MjsMesh | mujoco.MjsHField]:
+    """The meshes and height fields that are read from files."""
+    return [asset for asset in (*spec.meshes, *spec.hfields) if asset.file]
 
 
 def assets_of(path: File) -> File:

@@ -15,11 +15,11 @@ from ...engines.mujoco.motion import Path as Run
 from ...engines.mujoco.motion import data_at, movements, near, stages_of
 from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
-from ...engines.mujoco.smaller import Smaller, assets_of, finished, of_parts
+from ...engines.mujoco.smaller import Smaller, assets_of, files_of, finished, of_parts
 from ...engines.mujoco.source import Source, without_visuals
 from ...judge.agree import worst_of_each
 from ...judge.entries import Entries
-from ...judge.run import movement_unit
+from ...judge.run import movement_unit, number_or_none
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ...stability.answer import Asked, limit_row
@@ -73,14 +73,12 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "file": str(reading.source),
         "command": setup.command,
         "write": setup.request.write,
-        "assets": "",
         "free": [row for row, _ in kinds],
     }
     add_tables(result, scene, locks, list(locked), kinds, small)
     with TemporaryDirectory() as folder:
         path = Path(setup.request.write or Path(folder) / "smaller.xml")
-        if small.spec.meshes or small.spec.hfields:
-            facts["assets"] = assets_of(path).name
+        facts["assets"] = assets_of(path).name if files_of(small.spec) else ""
         small.write(path, block(TEXT, "comment", facts=facts))
         written = Smaller.whole(Source(path))
     facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, written)
@@ -113,12 +111,12 @@ def add_tables(
     for number, (row, _) in enumerate(kinds):
         row.before, row.after = (1e6 * times[place] / runs[0].steps for place in (number, number + 1))
     result.tables["reduction_free"] = [row for row, _ in kinds]
-    rows = [JointRow(name, moved, locked=name in names) for name, moved in use.ranges.items()]
-    for row in rows:
-        for number, group in enumerate(locks.groups):
-            if row.joint in group.names:
-                row.predicted, row.error_alone = group.predicted, locks.error_alone(number)
-    result.tables["reduction_joints"] = sorted(rows, key=lambda row: row.moved)
+    joints = {name: JointRow(name, moved, locked=name in names) for name, moved in use.ranges.items()}
+    for number, group in enumerate(locks.groups):
+        for name in group.names:
+            joints[name].predicted = group.predicted
+            joints[name].error_alone = number_or_none(locks.error_alone(number))
+    result.tables["reduction_joints"] = sorted(joints.values(), key=lambda joint: joint.moved)
     pairs = near(scene.whole.model, scene.positions(scene.whole), use.pairs)
     result.tables["reduction_near"] = [PairRow(*pair, distance) for pair, distance in pairs.items()]
 

@@ -273,6 +273,15 @@ def test_where_everything_moves_and_touches_nothing_is_left_out():
     assert all(check.passed for check in result.checks)
 
 
+def test_a_run_that_fails_is_infinitely_far(two_arms):
+    """From the time on where it fails; of two motions, one."""
+    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    paths, others = arms.run(arms.whole), arms.run(arms.whole)
+    assert arms.apart(paths, others) == 0.0
+    others[0].q[-1, 3] = np.nan
+    assert arms.apart(paths, others) == arms.apart(2 * paths, paths + others) == np.inf
+
+
 def row(gain, error, locked=0, own=None) -> FrontierRow:
     numbers = {"error": error, "error_of_model": 0.0, "error_of_step": error, "error_at_own_step": own}
     return FrontierRow(model="", locked=locked, integrator="Euler", dt=0.1, gain=gain, **numbers)
