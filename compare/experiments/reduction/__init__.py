@@ -10,16 +10,15 @@ from tmt.exact.tree import DIGITS
 from ...core.check import About
 from ...core.finding import Finding
 from ...engines.mujoco import ModelError
-from ...judge.rounding import NARROW
-from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...robots.case import Case
+from ...truth.smallest import needed
 from .. import Experiment
 from ..setup import Setup, nothing
 from . import of_file
 from .exact_motion import compare_swing, is_pendulum
-from .needs import compare_case
-from .records import Need, ReductionResult
+from .records import Need, NeedRow, ReductionResult
 from .sub_blocks import compare_blocks
 
 EXPERIMENT = Experiment(
@@ -32,8 +31,7 @@ EXPERIMENT = Experiment(
 
 def claim_values(robot: Robot) -> dict[str, str | float]:
     joint = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
-    unit = movement_unit(robot.coordinates)
-    return {"joint": joint, "unit": unit, "digits": DIGITS, "eps": FACTOR, "narrow": NARROW}
+    return {"joint": joint, "digits": DIGITS, "eps": FACTOR}
 
 
 def begin(setup: Setup) -> Iterable[ReductionResult]:
@@ -58,9 +56,17 @@ def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
         groups.setdefault(need, []).append(scene)
     findings, about = [], claim_values(robot)
     for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
-        apart = max((value for (scene, _), value in result.apart.items() if scene in scenes), default=None)
-        findings.append(result.finding("answer", scenes=scenes, apart=apart, about=about, **need._asdict()))
+        findings.append(result.finding("answer", scenes=scenes, about=about, **need._asdict()))
     return findings
+
+
+def add_need(result: ReductionResult, case: Case) -> None:
+    """Which joints a case needs, and why."""
+    need = needed(case)
+    names = tuple(name for name in case.joints if name in need.moves)
+    rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
+    result.tables.setdefault("reduction_needs", []).extend(rows)
+    result.needs[case.name] = Need(names, case.scene.locked, need.stays)
 
 
 def untimed(setup: Setup) -> ReductionResult:
@@ -73,7 +79,7 @@ def untimed(setup: Setup) -> ReductionResult:
             compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
         for case in robot.cases_of_torque:
             if not robot.is_read:
-                compare_case(result, case, setup)
+                add_need(result, case)
             if is_pendulum(case):
                 compare_swing(result, setup, case)
     except ModelError as error:

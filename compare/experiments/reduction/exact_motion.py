@@ -5,17 +5,15 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...core.check import Result
-from ...engines import LABELS
+from ...engines import LABELS, same_scheme
 from ...judge.order import check_order, measured_order
 from ...judge.run import MOVES
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing
 from ..setup import Setup
-from .needs import rk4_of
 from .records import ReductionResult, Swing
 
 SWING_STEPS = (4, 8, 16, 32, 64, 128)  # multiples of the case's own steps
-IN_TABLE = 16  # the one of these whose error is in the table
 ORDER = 4  # of RK4
 ROUNDED = 1e-11  # rad: smaller errors contain rounding
 
@@ -37,11 +35,11 @@ def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
     dt = [case.duration / case.steps / finer for finer in SWING_STEPS]
     errors: dict[str, list[float]] = {}
     for engine, dynamics in setup.compared(case).items():
-        method, errors[engine] = rk4_of(setup.engines, engine).name, []
+        scheme = setup.engines["mujoco"].methods["RK4"]
+        method, errors[engine] = same_scheme(setup.engines, scheme, engine).name, []
         for finer, step in zip(SWING_STEPS, dt):
             path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
             errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
-        result.apart[case.name, engine] = errors[engine][SWING_STEPS.index(IN_TABLE)]
     result.swings[case.name] = Swing(dt, errors, check_falling(result, case.name, dt, errors))
 
 

@@ -136,5 +136,4 @@ class Swing(NamedTuple):
 @dataclass
 class ReductionResult(Result):
     needs: dict[str, Need] = field(default_factory=dict)  # by scene
-    apart: dict[tuple[str, str], float] = field(default_factory=dict)  # by scene and engine, rad or m
     swings: dict[str, Swing] = field(default_factory=dict)  # by scene

@@ -12,14 +12,11 @@ from compare.core.check import Result
 from compare.core.text import say
 from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
-from compare.experiments.followed import Deviation
-from compare.experiments.reduction import exact_motion, needs, sub_blocks
+from compare.experiments.reduction import exact_motion, sub_blocks
 from compare.experiments.reduction.records import ReductionResult, SubsetRow
-from compare.experiments.setup import Setup
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
-from compare.robots.case import Coordinates
-from compare.truth.smallest import needed, reduced
+from compare.truth.smallest import needed
 
 ORDERS = {4.149: True, 4.151: False, 3.851: True, 3.849: False}
 FALLING = [([2.0**order * 1e-8, 1e-8, 9e-12, 8e-12], [passes]) for order, passes in ORDERS.items()]
@@ -101,34 +98,6 @@ def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
 
 
-def test_the_planar_arm_moves_as_the_whole_one(engines):
-    case, setup, result = ARM.cases[0], Setup.small(ARM, engines), ReductionResult("reduction")
-    smaller = reduced(case)
-    assert smaller.joints == ("alpha", "gamma")
-    needs.compare_smaller(result, case, smaller, setup)
-    assert len(result.checks) == 6 and failed(result) == []
-    # a planar arm that starts elsewhere is another motion
-    needs.compare_smaller(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup)
-    assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
-
-
-def test_each_engine_is_compared_with_its_own_smaller_model(mujoco):
-    braked = WrongLock(mujoco, lambda case: mujoco.of(case.changed(damping=1e-6)))
-    case, result = ARM.cases[0], ReductionResult("reduction")
-    needs.compare_smaller(result, case, reduced(case), setup_of(braked))
-    assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
-
-
-def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
-    """A motion that is small is no failure."""
-    more = {"duration": 0.5, "dt": 1 / 64, "judged": 0.0, "tags": ("own",)}
-    case = ARM.case("own", posture="hanging", speed=(0, 1e-3, 0), **more)
-    result = ReductionResult("reduction")
-    needs.compare_case(result, case, Setup.small(ARM, engines))
-    assert failed(result) == [] and "movement" not in {check.quantity for check in result.checks}
-    assert result.needs["own"].needed == ARM.joints
-
-
 def test_a_held_posture_with_springs_needs_nothing():
     held = next(case for case in setup_of_file(PATHS["gripper"]).robot.cases if case.is_held)
     assert held.tree.has_springs and needed(held).stays == held.joints
@@ -149,21 +118,6 @@ def test_sub_blocks_agree_within_64_eps(apart, passes):
     row = SubsetRow(locked="beta", quantity="Mbar", parties="reduced, TMT to MuJoCo", unit="kg m2")
     found = verdicts(sub_blocks.check_blocks, "beta locked", row, off, scale)
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
-
-
-@pytest.mark.parametrize("apart, width, required, within, long_enough", [
-    (0.99e-9, 1e-9, 5.0, True, True), (1.01e-9, 1e-9, 5.0, False, True), (np.nan, 1e-9, 5.0, False, True),
-    (1e-300, 0.0, 5.0, False, True), (0.0, 0.99e-3, 5.0, True, True),
-    (1.0, 1.01e-3, 3.0, True, True),  # too wide from 4 s on: then nothing is judged there
-    (0.0, 1.01e-3, 3.01, True, False),
-])  # fmt: skip
-def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, required, within, long_enough):
-    t = np.arange(6.0)
-    off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
-    off[4, 1], band[4, 1] = apart, width
-    deviation = Deviation(Coordinates(("alpha", "gamma")), t, off, band)
-    found = verdicts(needs.check_smaller, "zero, free", deviation, required)
-    assert found == {"smallest model to whole": within, "time judged": long_enough}
 
 
 @pytest.mark.parametrize("errors, passed", [  # each of half the step of the last; those below 1e-11 rad are rounding

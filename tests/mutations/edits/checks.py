@@ -7,7 +7,7 @@ CHECKS = (
     ("published", "check_answer", "every_digit"), ("published", "check_answer", "size"),
     ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
     ("conclusions", "check_same_schemes", "quantity"), ("conclusions", "check_stopped", "quantity"),
-    ("conclusions", "check_smallest_errors", "quantity"), ("needs", "check_smaller", '"time judged"'),
+    ("conclusions", "check_smallest_errors", "quantity"),
     ("reduction", "untimed", "quantity"), ("sub_blocks", "check_blocks", "name"),
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("followed", "check_closest", "quantity"),

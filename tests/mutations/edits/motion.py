@@ -53,6 +53,4 @@ EDITS = (
     ("pendulum", "swing", "ellipj(frequency * t + _1, k * k)[0]", "np.sin(frequency * t)", "a sine as the exact swing"),
     ("sub_blocks", "sub_block_differences", "smaller[0] - smaller[1]", "smaller[0] - smaller[0]", "TMT is compared with itself"),
     ("sub_blocks", "compare_blocks", "rng.uniform(-10.0, 10.0, _1)", "1e-10 * _0", "no bias in motion"),
-    ("needs", "compare_smaller", "references[engine]", "references['tmt']", "MuJoCo meets TMT's smaller model"),
-    ("needs", "check_smaller", "apart[judged]", "apart[:1]", "the first state is judged"),
 )  # fmt: skip
