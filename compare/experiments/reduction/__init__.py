@@ -98,5 +98,3 @@ def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:
 
     if frontier := result.tables.get("reduction_frontier"):
         yield partial(figures_reduction.draw_frontier, result, frontier)
-    for scene in result.swings:
-        yield partial(figures_reduction.draw_swing, result, scene)

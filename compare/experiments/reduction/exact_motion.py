@@ -11,7 +11,7 @@ from ...judge.run import MOVES
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing
 from ..setup import Setup
-from .records import ReductionResult, Swing
+from .records import ReductionResult
 
 SWING_STEPS = (4, 8, 16, 32, 64, 128)  # multiples of the case's own steps
 ORDER = 4  # of RK4
@@ -40,7 +40,9 @@ def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
         for finer, step in zip(SWING_STEPS, dt):
             path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
             errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
-    result.swings[case.name] = Swing(dt, errors, check_falling(result, case.name, dt, errors))
+    orders = check_falling(result, case.name, dt, errors)
+    engines = [(LABELS[name], orders.get(name), values[-1]) for name, values in errors.items()]
+    result.find("swing", scene=case.name, engines=engines)
 
 
 def check_falling(

@@ -1,4 +1,4 @@
-"""What reduction finds: rows of its tables, what each scene needs, and swings that are known exactly."""
+"""What reduction finds: rows of its tables, and what each scene needs."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -127,13 +127,6 @@ class Need(NamedTuple):
     stays: tuple[str, ...]  # those that can be locked
 
 
-class Swing(NamedTuple):
-    dt: list[float]  # s
-    errors: dict[str, list[float]]  # of each engine, rad
-    orders: dict[str, float]
-
-
 @dataclass
 class ReductionResult(Result):
     needs: dict[str, Need] = field(default_factory=dict)  # by scene
-    swings: dict[str, Swing] = field(default_factory=dict)  # by scene
