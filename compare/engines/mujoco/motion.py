@@ -13,7 +13,10 @@ from .names import INTEGRATORS, bit, control_of, element_name, number_of_actuato
 Array = np.ndarray
 Places = Callable[[mujoco.MjModel], dict[str, tuple[slice, slice]]]  # joints or actuators
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-INPUTS = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+INPUTS = sum(
+    int(getattr(mujoco.mjtState, f"mjSTATE_{name}"))
+    for name in ("CTRL", "QFRC_APPLIED", "MOCAP_POS", "MOCAP_QUAT")
+)
 NEAR, SAMPLES = 0.01, 25  # m, and states of a motion: pairs that came so near are told
 EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
 ACTS = {  # what has a row of constraints, by the kinds of rows
@@ -72,7 +75,7 @@ def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
 class Motion:
     """A motion of a whole model, which smaller ones repeat. Controls are constant between their times.
 
-    start: the state, and the forces that act all the time. inputs: the controls, (times, nu).
+    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls, (times, nu).
     """
 
     name: str
@@ -88,6 +91,7 @@ class Motion:
         controls, activations = columns(model, start.model, actuators)
         data.qpos[:], data.qvel[:], data.qfrc_applied[:] = start.qpos[q], start.qvel[v], start.qfrc_applied[v]
         data.ctrl[:], data.act[:] = self.inputs[0, controls], start.act[activations]
+        data.mocap_pos[:], data.mocap_quat[:] = start.mocap_pos, start.mocap_quat
         return data
 
     def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
@@ -131,8 +135,9 @@ class Simulation:
             data, steps = motion.placed(self.model), max(1, round(motion.duration / dt))
             start = np.zeros(mujoco.mj_stateSize(self.model, STATE))
             mujoco.mj_getState(self.model, data, start, STATE)
-            forces = np.tile(data.qfrc_applied, (steps, 1))
-            self.runs.append((start, np.hstack([motion.controls(self.model, dt, steps), forces])))
+            held = np.r_[data.qfrc_applied, data.mocap_pos.ravel(), data.mocap_quat.ravel()]
+            inputs = np.hstack([motion.controls(self.model, dt, steps), np.tile(held, (steps, 1))])
+            self.runs.append((start, inputs))
         self.steps = sum(len(inputs) for _, inputs in self.runs)
 
     def __call__(self) -> list[Path]:
@@ -154,7 +159,7 @@ class Simulation:
             mujoco.mj_setState(self.model, self.data, start, STATE)
             yield self.data
             for row in inputs:
-                self.data.ctrl[:], self.data.qfrc_applied[:] = np.split(row, [self.model.nu])
+                mujoco.mj_setState(self.model, self.data, row, INPUTS)
                 mujoco.mj_step(self.model, self.data)
                 yield self.data
 

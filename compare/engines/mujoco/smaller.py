@@ -248,5 +248,7 @@ def finished(small: Smaller, motions: Iterable[Motion], dt: float, integrator: s
         spec.delete(key)
     for motion in motions:
         data = motion.placed(small.model)
-        spec.add_key(name=motion.name, qpos=data.qpos, qvel=data.qvel, act=data.act, ctrl=data.ctrl)
+        places = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()}
+        state = {"qpos": data.qpos, "qvel": data.qvel, "act": data.act, "ctrl": data.ctrl}
+        spec.add_key(name=motion.name, **state, **places)
     return Smaller(spec)

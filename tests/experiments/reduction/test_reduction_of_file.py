@@ -200,6 +200,26 @@ def test_what_cannot_be_written_is_refused_at_once(tmp_path, place, message):
         compared_with(None, str(path)).request_of(options)
 
 
+PULLED = """<mujoco><worldbody><body name="hand" mocap="true" pos="0.3 0 1"/><body name="arm" pos="0 0 1">
+<joint name="arm" axis="0 1 0" damping="1"/><geom size="0.05" pos="0.3 0 0"/></body>
+<body pos="2 0 0"><joint name="still" axis="0 0 1" damping="1"/><geom size="0.05" pos="0.3 0 0"/></body></worldbody><equality>
+<connect body1="hand" body2="arm" anchor="0 0 0"/></equality><keyframe><key name="up" mpos="0.2 0 1.3"/></keyframe></mujoco>"""
+
+
+def test_a_body_that_is_moved_from_outside_is_where_the_keyframe_has_it(tmp_path):
+    """It pulls the arm up, also in the written file."""
+    path, turned = tmp_path / "smaller.xml", []
+    assert all(check.passed for check in answered(PULLED, write=str(path)).checks)
+    for model in (mujoco.MjModel.from_xml_string(PULLED), mujoco.MjModel.from_xml_path(str(path))):
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        while data.time < 0.5:
+            mujoco.mj_step(model, data)
+        turned.append(data.joint("arm").qpos[0])
+    assert turned[0] == pytest.approx(turned[1], abs=1e-3) and turned[0] < -0.5
+    assert model.njnt == 1
+
+
 def test_what_the_scene_used_is_a_table(two_arms):
     use = {row.part: row for row in two_arms[0].tables["reduction_use"]}
     assert (use["actuators"].in_file, use["actuators"].used) == (5, 2)
