@@ -165,7 +165,7 @@ def add_checks(
     quantity, exact = "error of the smaller file", scene.finely
     if chosen.at_own_step:
         quantity, exact = "smaller file to the file as it is, by its own step", scene.run
-    paths, note = scene.run(written, row.dt, row.integrator), f"{row.locked} joints locked"
+    paths, note = scene.run(written, row.dt, row.integrator), f"joints locked: {row.locked}"
     for motion, path, other in zip(scene.motions, paths, exact(scene.whole)):
         error = scene.apart([path], [other])
         result.check(motion.name, quantity, error, chosen.allowed, unit, note, about=About.PREDICTION)

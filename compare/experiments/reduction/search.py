@@ -138,7 +138,7 @@ def frontier(
     for groups in sorted(sets, key=len):
         small, count = locks.model(groups), len(locks.positions(groups))
         if small and locks.error(groups) < np.inf:
-            models.append((f"{count} joints locked" if count else "without what is not used", small, groups))
+            models.append((f"joints locked: {count}" if count else "without what is not used", small, groups))
     reference, own = scene.finely(scene.whole), (scene.reading.integrator, scene.reading.dt)
     steps = [multiple * scene.reading.dt for multiple in STEPS]
     settings = [own, *(setting for setting in product(INTEGRATORS, steps) if setting != own)]
@@ -176,14 +176,14 @@ def seconds_of(runs: Sequence[Simulation]) -> dict[int, float]:
 
 
 class Answer(NamedTuple):
-    """The fastest for an error of the exact motion, and at the file's own step for one of its own run.
+    """The fastest for an error, rad or m, of the exact motion or, at the file's own step, of its own run.
 
-    Where nothing is gained of the exact motion, `row` is the latter.
+    exact: the fastest for one of the exact motion; None: there is none.
     """
 
     allowed: float
     row: FrontierRow
-    own: FrontierRow
+    exact: FrontierRow | None
 
     @property
     def at_own_step(self) -> bool:
@@ -196,13 +196,9 @@ class Answer(NamedTuple):
 
 
 def answer_within(rows: Sequence[FrontierRow], allowed: float) -> Answer:
-    """For an error, rad or m."""
     exact = [row for row in rows if row.error <= allowed]
     own = [row for row in rows if row.error_at_own_step is not None and row.error_at_own_step <= allowed]
-    fastest = best_of(own)
-    if exact and best_of(exact).gain >= AS_FAST:
-        return Answer(allowed, best_of(exact), fastest)
-    return Answer(allowed, fastest, fastest)
+    return Answer(allowed, best_of([*exact, *own]), best_of(exact) if exact else None)
 
 
 def best_of(rows: Sequence[FrontierRow]) -> FrontierRow:

@@ -239,7 +239,7 @@ def test_the_result_goes_to_the_process_that_draws(two_arms):
 
 def test_the_equations_of_the_smaller_model_are_those_of_tmts_lock(two_arms):
     result, path = two_arms
-    where = "home, 2 joints locked"
+    where = "home, joints locked: 2"
     quantities = {check.quantity for check in result.checks if check.scene == where}
     assert quantities == {f"{name}, lock of tmt to the smaller model" for name in ("Mbar", "bias")}
     whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, ReductionResult("reduction")
@@ -328,6 +328,7 @@ WHOLE = row(1.0, 0.5, own=0.0)
     ([WHOLE, row(3.0, 1.0), row(9.0, 1.01)], 1, False), ([WHOLE, row(3.0, 1.01)], 0, False),  # within the error; none is
     ([WHOLE, row(3.1, 1.0), row(3.0, 0.5, 2)], 2, False), ([WHOLE, row(3.2, 1.0), row(3.0, 0.5, 2)], 1, False),
     ([row(1.0, 1.01, own=0.0), row(3.0, 1.02)], 0, True),
+    ([WHOLE, row(2.7, 0.9), row(4.8, 2.0, own=0.1)], 2, True), ([WHOLE, row(5.2, 0.9), row(4.8, 2.0, own=0.1)], 1, False),
     ([WHOLE, row(1.04, 0.5), row(2.0, 5.0, 3, own=1.0)], 2, True), ([WHOLE, row(2.0, 5.0, 3, own=1.01)], 0, False),
 ])  # fmt: skip
 def test_the_fastest_within_the_error_is_the_answer(rows, best, at_own_step):
