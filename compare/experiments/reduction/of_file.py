@@ -1,6 +1,6 @@
 """No more model than a motion of a file needs: the answer, its tables, its checks, and the file to take away."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -11,24 +11,21 @@ from tmt import Tree
 
 from ...core.check import About
 from ...core.text import block
-from ...engines.mujoco.motion import Path as Run
-from ...engines.mujoco.motion import data_at, movements, near, stages_of
+from ...engines.mujoco.motion import near, stages_of
 from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, assets_of, files_of, finished, of_parts
-from ...engines.mujoco.source import Source, without_visuals
+from ...engines.mujoco.source import Source
 from ...judge.agree import worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit, number_or_none
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
-from ...stability.answer import Asked, limit_row
-from ...stability.limits import GIVES_WAY
-from ...stability.place import postures_of, standing_at
 from ..setup import Setup
-from .records import FreeRow, JointRow, LimitRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
+from .limits import compared_limits, stable_answers
+from .records import FreeRow, JointRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
-from .search import Answer, Locks, answer_within, frontier, seconds_of, take_out
+from .search import Answer, Locks, frontier, seconds_of, take_out
 from .sub_blocks import check_blocks, units_of
 
 TEXT = "reduction_of_file"  # the template
@@ -52,7 +49,7 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     locks = Locks(scene, kinds[-1][1] if kinds else scene.whole)
     candidates = frontier(scene, locks, errors, setup.quiet)
     rows = [candidate.row for candidate in candidates]
-    answers = [answer_within(rows, error) for error in errors]
+    answers = stable_answers(scene, candidates, errors)
     for best in answers:
         best.row.best_for = f"{best.row.best_for}, {best.allowed:g}".strip(", ")
     chosen, row = answers[1], answers[1].row
@@ -186,28 +183,3 @@ def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tre
         unit, parties = units_of(coordinates)[quantity], "lock of tmt to the smaller model"
         row = SubsetRow(locked="", quantity=quantity, parties=parties, unit=unit)
         check_blocks(result, where, row, *worst_of_each(differences, entries))
-
-
-def compared_limits(scene: Scene, small: Smaller, integrators: Sequence[str]) -> list[LimitRow]:
-    """The step limits of the whole and of the smaller file, where the robot rests near the start of the first motion."""
-    rows, rests = [], dict[str, Run]()
-    for model, file in (("whole", scene.whole), ("smaller", small)):
-        start = finished(file, scene.motions[:1], scene.reading.dt, scene.reading.integrator)
-        reading = read(without_visuals(start.spec).compile())
-        place, asked = (
-            standing_at(reading, postures_of(reading)[0]),
-            Asked(reading.dt, reading.integrator, ()),
-        )
-        for integrator in integrators:
-            if np.abs(place.moved).max(initial=0.0) > GIVES_WAY:
-                rows.append(LimitRow(model, integrator, "rests_elsewhere"))
-                continue
-            answer, found = limit_row(place, integrator, asked._replace(in_runs=False))
-            rest = data_at(place.model, found.rest.state).qpos[None].copy()
-            other = rests.setdefault(integrator, Run(place.model, reading.dt, rest, rest))
-            differences = movements(Run(place.model, reading.dt, rest, rest), other)
-            joint = max(differences, key=differences.__getitem__)
-            row = LimitRow(model, integrator, answer.limit, answer.predicted_dt, answer.limiting_joint)
-            row.apart, row.apart_joint = differences[joint], joint
-            rows.append(row)
-    return rows

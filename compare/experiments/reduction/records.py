@@ -116,6 +116,7 @@ class FrontierRow(Row):
     error_at_own_step: float | None = None
     time_of_second: float = column("s", default=0.0)  # of motion
     gain: float = 1.0  # over the file as it is
+    stable_at_rest: bool = True  # False: a step of an answer, or one as long, which is not stable there
     best_for: str = ""
 
 

@@ -82,7 +82,11 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     if cases and request.controls:
         raise ValueError("--controls and --scenes both say what the robot does")
     motions = [motion_of_case(case, reading, whole) for case in cases]
-    return Scene(reading, motions or [motion_of_posture(setup, reading, whole)], whole, points)
+    scene = Scene(reading, motions or [motion_of_posture(setup, reading, whole)], whole, points)
+    paths = scene.run(whole)
+    if scene.apart(paths, paths):  # not finite
+        raise ValueError(f"the file's own run fails ({reading.integrator}, {1e3 * reading.dt:g} ms)")
+    return scene
 
 
 def motion_of_case(case: Case, reading: Reading, whole: Smaller) -> Motion:

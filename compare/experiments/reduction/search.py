@@ -196,7 +196,7 @@ class Answer(NamedTuple):
 
 
 def answer_within(rows: Sequence[FrontierRow], allowed: float) -> Answer:
-    exact = [row for row in rows if row.error <= allowed]
+    exact = [row for row in rows if row.error <= allowed and row.stable_at_rest]
     own = [row for row in rows if row.error_at_own_step is not None and row.error_at_own_step <= allowed]
     return Answer(allowed, best_of([*exact, *own]), best_of(exact) if exact else None)
 

@@ -19,9 +19,10 @@ from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
+from compare.experiments.reduction.limits import stable_answers
 from compare.experiments.reduction.records import FrontierRow, ReductionResult
 from compare.experiments.reduction.scene import scene_of
-from compare.experiments.reduction.search import answer_within, take_out
+from compare.experiments.reduction.search import Candidate, answer_within, take_out
 from compare.experiments.setup import Request
 from compare.robots.scene_file import SceneError, read_controls, read_scenes
 from compare.run.reference import compared_with
@@ -305,6 +306,35 @@ def test_where_everything_moves_and_touches_nothing_is_left_out():
     facts = answer | {"names": ["a"]}
     assert "nothing is gained at" in say(replace(result.top[0], values={"facts": facts}))
     assert all(check.passed for check in result.checks)
+
+
+# a stiff damper, which is at rest: RK4 is not stable at its own step, or beyond it
+DAMPED = """<mujoco><option integrator="RK4" timestep="{}"/><worldbody><body><joint name="hinge" axis="0 1 0" damping="1"/>
+<geom size="0.05" mass="0.1" pos="0 0 -0.1"/></body></worldbody><keyframe><key qvel="{}"/></keyframe></mujoco>"""
+
+
+def test_no_answer_is_a_step_that_is_unstable_at_rest():
+    """A robot that rests exactly stays at any step: the run shows nothing."""
+    result = answered(DAMPED.format(1e-3, 0.0))
+    rows = result.tables["reduction_frontier"]
+    (limit,) = [
+        row for row in result.tables["reduction_limits"] if (row.model, row.integrator) == ("smaller", "RK4")
+    ]
+    assert 1e-3 < limit.step < 8e-3
+    told = [row for row in rows if row.best_for]
+    assert told and all(row.integrator != "RK4" or row.dt <= limit.step for row in told)
+    only_rk4 = [row for row in rows if row.integrator == "RK4"]
+    assert max(row.error for row in only_rk4 if row.dt > limit.step) < 1e-3  # its run shows nothing
+    scene_at_rest = scene(DAMPED.format(1e-3, 0.0))
+    candidates = [Candidate(replace(row, gain=row.dt), scene_at_rest.whole, frozenset()) for row in only_rk4]
+    answers = stable_answers(scene_at_rest, candidates, [1e-3])
+    assert answers[0].row.dt == max(row.dt for row in only_rk4 if row.dt <= limit.step)
+
+
+def test_a_file_whose_own_run_fails_is_not_judged():
+    result = answered(DAMPED.format(0.02, 1.0))
+    (check,) = result.checks
+    assert not check.passed and "own run fails" in str(check)
 
 
 def test_a_run_that_fails_is_infinitely_far(two_arms):
