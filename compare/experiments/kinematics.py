@@ -4,10 +4,10 @@ from ..core.check import Result
 from ..core.finding import Finding
 from ..robots import Robot
 from . import Experiment
-from .quantities import QUANTITIES, compared, figures, headline
+from .quantities import QUANTITIES, compared, headline
 from .setup import Setup
 
-__all__ = ["EXPERIMENT", "claim_values", "figures", "headline", "rows", "skipped"]
+__all__ = ["EXPERIMENT", "claim_values", "headline", "rows", "skipped"]
 EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
 
 

@@ -74,7 +74,6 @@ EDITS = (
     # what is drawn, and said of it
     ("stick", "stick_figure", "joint not in tree.parent", "True", "a stick goes to every centre of mass"),
     ("stick", "as_seen", "[RIGHTWARD, UPWARD]", "[UPWARD, RIGHTWARD]", "up is to the right"),
-    ("figures", "draw_distances", "max(quantities, *_1)", "min(quantities, *_1)", "the least distance is the largest"),
     ("figures_runs", "draw_held", "path.left", "run.paths['mujoco'].left", "MuJoCo's departure is told of TMT", 1),
     ("figures_runs", "draw_held", "result.errors[name]", "_0[::-1]", "the caption exchanges the engines"),
     ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
