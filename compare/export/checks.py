@@ -159,7 +159,7 @@ def times(
         calls[name, "tmt"] = partial(compiled.fill, False, np.empty((count, compiled.size)), q, qd, tau, dt)
     if not MinimalCalls.unavailable():
         loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(q[0], qd[0], tau[0])
-        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"][1], count)
+        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"], count)
     for call in calls.values():
         call()  # its code is compiled, or loaded, on the first call
     ns = {key: 1e9 * seconds / count for key, seconds in timing.fastest(calls, ROUNDS).items()}
