@@ -26,7 +26,6 @@ SHOWN = (  # fields of a comparison in a report; its file has all
 class AgreementRow(Row):
     """One quantity over the states of a sample; the column of `from_exact` is named after the engine."""
 
-    SHARE = "difference_over_bar"
     engine: str
     scene: str
     quantity: str

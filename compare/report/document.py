@@ -49,7 +49,6 @@ class Listing(NamedTuple):
     rows: pd.DataFrame | None  # None: its file alone has them
     name: str = ""  # of its file
     title: str = ""
-    which: str = ""  # how many of how many are shown, if not all
 
 
 class Document:
@@ -164,8 +163,8 @@ class Document:
         is_main = self.page or name == section.name or name in MAIN_TABLES
         if columns == [] or name in section.result.filed or not is_main:
             return Listing(len(rows), None, name, title)
-        few, which = tables.shortened(rows, MOST_ROWS if self.page else MOST_IN_MARKDOWN)
-        return Listing(len(rows), tables.of_rows(few, columns), name, title, which)
+        few = rows[: MOST_ROWS if self.page else MOST_IN_MARKDOWN]
+        return Listing(len(rows), tables.of_rows(few, columns), name, title)
 
 
 def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:

@@ -63,8 +63,6 @@ EDITS = (
     ("published", "PrintedRow.is_met", "max(_1, _2)", "min(_1, _2)", "a number that one engine meets is met by both"),
     ("core.check", "largest_known", "max(*_1)", "min(*_1)", "the picture has the least distance"),
     ("stability.limits", "summary", "max(_1, *_2)", "min(_1, *_2)", "the nearest limit is told as the farthest"),
-    ("report.tables", "shortened", "rows[number].urgency", "0", "a row that fails may be left out"),
-    ("report.tables", "shortened", "sorted(numbers[:most])", "sorted(numbers[-most:])", "the least urgent rows are shown"),
     ("report.tables", "text_of", "column.digits", "3", "printed numbers have three digits"),
     ("provenance", "provenance", "Path(model).read_bytes()", "str(model).encode()", "a model's hash is of its name"),
     ("provenance", "commit", "_1 if changed else ''", "''", "changes since a commit are not told"),
