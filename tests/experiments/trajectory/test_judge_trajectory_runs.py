@@ -154,7 +154,7 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
 
 def test_which_figures_there_are_follows_what_was_run():
     result = TrajectoryResult("trajectory", runs=[run_of(FREE), run_of(HELD)], errors={HELD.name: (0.1, 0.2)})
-    names = ["assignment_figure_2", "trajectory_ball_catch_held", "trajectory_bent_free"]
+    names = ["assignment_figure_2", "motion", "trajectory_ball_catch_held", "trajectory_bent_free"]
     assert sorted(call()[0] for call in trajectory.figures(result, ARM)) == names
 
 
