@@ -43,7 +43,7 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     loops = evaluations.loops(setup)
     add_times(setup, scenes)
     result = judged(setup, scenes)
-    if settings := conclusions.cheapest_of_fronts(conclusions.best_rows(result)):
+    if settings := conclusions.cheapest_settings(result):
         values = {"settings": settings, **conclusions.target(result)}
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))

@@ -25,7 +25,7 @@ EDITS = (
     ("questions", "largest", "max(rows, key=_1)", "min(rows, key=_1)", "the smallest difference is the answer"),
     ("questions", "largest", "row['largest_difference'] is None", "False", "a diverged run is an answer"),
     ("questions", "printed", "row[name]", "row['mujoco']", "the answers name MuJoCo's numbers TMT's"),
-    ("conclusions", "within_target", "_1 <= TARGET", "True", "a setting beyond the target is cheapest"),
+    ("conclusions", "reaching", "_1 <= target", "True", "a setting beyond the target is cheapest"),
     ("verdict", "passed", "any(section.judged for section in sections)", "True", "a report without a check passes"),
     ("run.command", "carry_out", "not parts.broken", "True", "the exit status is 0 whatever part of the report breaks"),
     ("run.command", "carry_out", "0 if good else 1", "0", "the exit status is 0 whatever fails"),
