@@ -32,7 +32,8 @@ COUNT = 20
 
 @pytest.mark.parametrize("language, options", [
     ("c", []), ("c", ["--float"]), ("python", []), ("casadi", []), ("jax", []),
-    ("matlab", ["--quantity", "mass_matrix,bias,jacobians"]),
+    ("python", ["--quantity", "mass_matrix,bias,gravity_balance,derivatives"]),  # an entry of dtau/dqd is zero
+    ("matlab", ["--quantity", "mass_matrix,bias,jacobians,derivatives"]),
 ])  # fmt: skip
 def test_the_arm_in_a_language(language, options, tmp_path, capsys):
     if not NEEDS[language]:
