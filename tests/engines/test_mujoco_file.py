@@ -32,7 +32,10 @@ ASSETS = f"""<asset><texture name="t" type="2d" builtin="flat" width="{PIXELS}" 
 <material name="m" texture="t"/></asset>"""
 ALONG = '<actuator><general name="a" tendon="t" armature="1"/></actuator>'
 BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'
+FUSED = '<compiler fusestatic="true" inertiafromgeom="true"/>'
+LINK = f'<body name="c" pos="0.5 0 0">{STATED}</body>'
 REFUSED = {  # a word of why, and the file
+    "leaves out the <inertial>": mjcf(PLAIN.replace("</body>", f"{LINK}</body>"), FUSED),
     "tendon 't'": mjcf(TWO, after=TENDON.format('armature="1"')),
     "actuator 'a'": mjcf(TWO, after=TENDON.format("") + ALONG),
     "flex 'soft'": mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="2 2 2" spacing=".1 .1 .1" dim="3" mass="1">'
