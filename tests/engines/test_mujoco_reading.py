@@ -8,7 +8,7 @@ import pytest
 from files import PLAIN, TENDON, TWO, URDF, assert_the_same, case_of, mjcf
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import KINDS, PATHS, gymnasium_files, random_tree
+from models import KINDS, PATHS, gymnasium_files, random_tree, with_features
 from trees import random_state
 
 from compare.engines.mujoco import ModelError, Source, engine, read
@@ -101,7 +101,20 @@ def test_a_file_with_every_kind_of_joint():
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
-    compared(random_tree(seed, kinds, joints), np.random.default_rng(seed))
+    """And MuJoCo's own mass matrix and bias are the same, whatever else the file has on."""
+    text, rng = with_features(random_tree(seed, kinds, joints), seed), np.random.default_rng(seed)
+    reading, model = compared(text, rng), mujoco.MjModel.from_xml_string(text)
+    dynamics, data, M = (
+        engine(reading).of(case_of(reading.tree)),
+        mujoco.MjData(model),
+        np.zeros((model.nv, model.nv)),
+    )
+    q, v, _ = random_state(rng, reading.tree)
+    data.qpos[dynamics.qpos], data.qvel[dynamics.dofs] = q, v
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, M)
+    for found, expected in ((M, dynamics.mass_matrix(q)), (data.qfrc_bias, dynamics.bias(q, v))):
+        assert np.allclose(found[np.ix_(*[dynamics.dofs] * found.ndim)], expected, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("source", [PATHS["mixed"], random_tree(0), URDF], ids=["mixed", "random", "URDF"])

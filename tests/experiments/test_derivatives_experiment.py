@@ -23,8 +23,8 @@ def bent():
     return subjects.along(next(case for case in ARM.cases if case.name == "bent, damped"), 2)
 
 
-def shares(mujoco, subject, *integrators) -> dict[str, float]:
-    every = ways.measured(ways.Task(subject, integrators, False), mujoco, DT)
+def shares(mujoco, subject, *integrators, compiles=False) -> dict[str, float]:
+    every = ways.measured(ways.Task(subject, integrators, compiles), mujoco, DT)
     return {way: share for one in every for way, share in one.shares.items()}
 
 
@@ -60,16 +60,19 @@ def test_a_wrong_damper_is_seen_in_the_centred_differences(mujoco, bent):
     assert found[ways.NUMPY] <= 1.0  # of its own model they are exact
 
 
-def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch):
-    by_numpy = ways.Quantity.by_numpy
+@pytest.mark.parametrize("way, owner, name", [
+    (ways.NUMPY, ways.Quantity, "by_numpy"), (ways.COMPILED, ways.Evaluator, "of_rows"),
+])  # fmt: skip
+def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch, way, owner, name):
+    right = getattr(owner, name)
 
     def wrong(self, *arguments):
-        values = by_numpy(self, *arguments)
-        values[0, 0, 1] += 1e-9
+        values = right(self, *arguments)
+        values.reshape(len(values), -1)[0, 1] += 1e-9
         return values
 
-    monkeypatch.setattr(ways.Quantity, "by_numpy", wrong)
-    assert shares(mujoco, bent, "Euler")[ways.NUMPY] > 1.0
+    monkeypatch.setattr(owner, name, wrong)
+    assert shares(mujoco, bent, "Euler", compiles=True)[way] > 1.0
 
 
 def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relative_to():
