@@ -16,16 +16,8 @@ SECTION = re.compile(
     r"^ *(?:Parameters|Attributes)\n +-+\n(.*?)(?=\n *\n +\w+\n +-+\n|\Z)", re.MULTILINE | re.DOTALL
 )
 FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
-OTHERS = [
-    tmt.Tree,
-    tmt.Tree.lock,
-    tmt.Motion,
-    compare.assert_agrees,
-    compare.differences,
-    compare.step_limits,
-    compare.tree,
-    Difference,
-]
+OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Motion, Difference]
+OTHERS += [getattr(compare, name) for name in compare.__all__]
 
 
 @pytest.mark.parametrize("public", [*FUNCTIONS, *OTHERS], ids=lambda public: public.__qualname__)

@@ -140,14 +140,8 @@ def test_tmt_is_compared_with_mujocos_own_centred_function():
 
 
 def test_where_differences_lose_digits_is_said(bent):
-    about = {
-        "quantity": "A and B, RK4",
-        "way": "a",
-        "eps": 1e-5,
-        "states": 1,
-        "unit": "rad per rad",
-        "largest": 1.0,
-    }
+    about = {"quantity": "A and B, RK4", "way": "a", "eps": 1e-5, "states": 1, "largest": 1.0}
+    about["unit"] = "rad per rad"
     rows = [DerivativeRow(subject="stiff servos", error=error, **about) for error in (1e-7, 9e-9, None, 1e-9)]
     said = [
         say(Finding("derivatives", "hard", {"pairs": [{"row": row, "scenes": rows[3]}]})) for row in rows[:3]
