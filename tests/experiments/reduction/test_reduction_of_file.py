@@ -13,7 +13,7 @@ import tmt
 from compare.core.text import say
 from compare.engines.mujoco.motion import SAMPLES, Simulation, apart
 from compare.engines.mujoco.reading import read
-from compare.engines.mujoco.smaller import Smaller
+from compare.engines.mujoco.smaller import Smaller, finished
 from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
@@ -151,6 +151,20 @@ def test_what_the_scene_used_is_a_table(two_arms):
         0,
         1,
     )
+
+
+def test_each_kind_is_taken_out_of_what_the_kinds_before_it_have_left(two_arms):
+    rows = two_arms[0].tables["reduction_free"]
+    assert [row.before for row in rows[1:]] == [row.after for row in rows[:-1]]
+    assert rows[0].before > rows[-1].after
+
+
+def test_the_smaller_file_starts_where_the_motion_does():
+    arms = scene(
+        TWO_ARMS.replace('qpos="0 0 0 0"', 'qpos="0.1 0 0 0" ctrl="0.3 0 0 0 0"'), controls=waves("unused")
+    )
+    key = finished(arms.whole, arms.motion, 0.002, "Euler").model.key(0)
+    assert (key.name, key.qpos[0], key.ctrl[0]) == ("home", 0.1, 0.3)
 
 
 def test_the_result_goes_to_the_process_that_draws(two_arms):

@@ -63,6 +63,9 @@ EDITS = (
     ("reduction.of_file", "add_checks", "Simulation(read(_1).model, *_2)", "Simulation(small.model, *_2)", "no file is read"),
     ("reduction.of_file", "compare_locked", "tmt.mass_matrix(q, model=smaller)", "tmt.mass_matrix(q, model=tree)", "same M"),
     ("reduction.of_file", "compare_locked", "tmt.bias(q, v, model=smaller)", "tmt.bias(q, v, model=tree)", "same bias"),
+    ("reduction.of_file", "add_tables", "(number, number + 1)", "(0, number + 1)", "each kind is taken out of the whole"),
+    ("mujoco.smaller", "finished", "data.qpos", "small.model.qpos0", "a smaller file starts at qpos0"),
+    ("mujoco.smaller", "finished", "ctrl=data.ctrl", "ctrl=0.0 * data.ctrl", "a smaller file starts without controls"),
     # derivatives
     ("derivatives.ways", "Quantity.by_machine_code", "side_by_side(_1)", "self.by_numpy(subject, dt)", "no machine code"),
     ("derivatives.ways", "share_of_differences", "(_1 + left_out) / eps", "30 * _0", "rounding of differences x 30"),
