@@ -127,6 +127,13 @@ def test_the_model_that_is_read_is_small_and_has_its_contacts():
     assert reading.model.ngeom == 5
 
 
+def test_what_never_moves_has_its_part_of_a_total_mass():
+    mesh = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+    still = '<body><geom type="mesh" mesh="m"/></body>'
+    source = Source(mjcf(PLAIN + still, f'<compiler settotalmass="3"/>{mesh}'))
+    assert source.without_meshes().body("b").mass == source.model.body("b").mass < 3.0
+
+
 @pytest.mark.parametrize("why", REFUSED)
 def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
     with pytest.raises(ModelError, match=why) as error:

@@ -66,6 +66,9 @@ EDITS = (
     ("reduction.of_file", "add_tables", "(number, number + 1)", "(0, number + 1)", "each kind is taken out of the whole"),
     ("mujoco.smaller", "finished", "data.qpos", "small.model.qpos0", "a smaller file starts at qpos0"),
     ("mujoco.smaller", "finished", "ctrl=data.ctrl", "ctrl=0.0 * data.ctrl", "a smaller file starts without controls"),
+    ("mujoco.locked", "compiled_without", "smaller.jnt_stiffness[_1] = _2", "pass", "a springdamper is chosen anew"),
+    ("mujoco.locked", "add_parts", "armature=armature", "armature=0.0", "parts of a free joint lose its armature"),
+    ("source", "Source.without_meshes", "self.spec.compiler.settotalmass > 0.0", "False", "a total mass without meshes"),
     # derivatives
     ("derivatives.ways", "Quantity.by_machine_code", "side_by_side(_1)", "self.by_numpy(subject, dt)", "no machine code"),
     ("derivatives.ways", "share_of_differences", "(_1 + left_out) / eps", "30 * _0", "rounding of differences x 30"),
