@@ -28,6 +28,7 @@ OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator
 LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
 MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
 EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
+KEYS = '<keyframe><key name="up" qpos="inf"/><key name="pushed" ctrl="inf 0"/><key qpos="1"/></keyframe>'
 MORE = {  # feature: file, names
     "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
     "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
@@ -35,7 +36,7 @@ MORE = {  # feature: file, names
     "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),
     "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
     "gravcomp": (mjcf(LIGHT), ("b",)), "equality": (mjcf(TWO, after=EQUALITIES), ("equality 0",)),
-    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
+    "unusable keyframe": (mjcf(after=MOTORS + KEYS), ("up", "pushed")),
     "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
 }  # fmt: skip
 OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
