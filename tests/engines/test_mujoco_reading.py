@@ -28,9 +28,11 @@ OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator
 LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
 MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
 EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
+WALLS = """<geom name="floor" type="plane" size="1 1 1"/><geom name="wall" size="1" contype="0" conaffinity="0"/>
+<geom name="picture" size="1" contype="0" conaffinity="0"/>"""
 KEYS = '<keyframe><key name="up" qpos="inf"/><key name="pushed" ctrl="inf 0"/><key qpos="1"/></keyframe>'
 MORE = {  # feature: file, names
-    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
+    "contact": (mjcf(PLAIN + WALLS, after='<contact><pair geom1="wall" geom2="g"/></contact>'), ("floor", "wall", "g")),
     "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
     "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
     "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),

@@ -70,6 +70,7 @@ EDITS = (
     ("mujoco.locked", "add_parts", "armature=armature", "armature=0.0", "parts of a free joint lose its armature"),
     ("source", "Source.without_meshes", "self.spec.compiler.settotalmass > 0.0", "False", "a total mass without meshes"),
     ("inventory", "usable_keys", "np.hstack(_1)", "m.key_qpos", "a keyframe may have infinite controls"),
+    ("inventory", "contact_pairs", "[chosen, _1]", "[chosen]", "pairs that a file names do not touch"),
     # derivatives
     ("derivatives.ways", "Quantity.by_machine_code", "side_by_side(_1)", "self.by_numpy(subject, dt)", "no machine code"),
     ("derivatives.ways", "share_of_differences", "(_1 + left_out) / eps", "30 * _0", "rounding of differences x 30"),
