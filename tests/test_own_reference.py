@@ -22,17 +22,8 @@ from compare.experiments.setup import Setup, engines
 from compare.run import examine as experiment
 from compare.run.reference import compared_with
 
-OTHERS = [
-    "parameters",
-    "published",
-    "kinematics",
-    "engines",
-    "speed",
-    "stability",
-    "derivatives",
-    "reduction",
-]
 STATIC = ["mass", "gravity", "acceleration"]
+OTHERS = [name for name in EXPERIMENTS if name not in (*STATIC, "trajectory", "diagnosis")]
 
 
 @pytest.fixture

@@ -87,7 +87,8 @@ def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
     assert text.index("Note 4 &lt; 9.") < fold
     assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
     assert '"tables/mass.csv">' in text and '"tables/extra.csv">' in text and "<td>1.5</td>" not in text
-    assert [text.index(f'id="figure-{name}"') < fold for name in names] == [True, True, False, False, True]
+    above = [name for name in names if text.index(f'id="figure-{name}"') < fold]
+    assert above == [*names[:2], names[-1]]
 
 
 def text_of(path):
