@@ -99,12 +99,16 @@ class Comparison:
         self.take_random(states, seed)
 
     def read(self, mjcf: Any) -> None:
-        from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
+        from ..engines.mujoco import (
+            engine,
+            read,
+            tree_with_sites,
+        )  # here, so that `import compare` need not wait for it
 
         self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
         self.robot = robot_of(self.reading, "the model")
         self.mujoco = engine(self.reading).of(self.robot.case())
-        self.tree, self.coordinates = self.reading.tree, self.robot.coordinates
+        self.tree, self.coordinates = tree_with_sites(self.reading), self.robot.coordinates
 
     def take_random(self, states: int, seed: int) -> None:
         """Random states, fewer if the user's functions are slow."""

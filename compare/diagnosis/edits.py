@@ -11,7 +11,7 @@ import numpy as np
 from numpy import ndarray
 
 from ..core.words import listed
-from .model import Changes, Equations, Path
+from .model import Changes, Equations, Frame, Path
 from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
 from .variants import Variant, variant
 
@@ -22,6 +22,7 @@ UNITS = {  # factors of units that are taken for others, and the fields of a tre
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
+EQUAL = 1e-12  # of a moment of inertia: two that are equal but for rounding
 Edit = tuple[str, str, dict[str, ndarray]]
 Way = Callable[[ndarray], ndarray]
 Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains
@@ -90,7 +91,7 @@ def axial_for_transverse(I: ndarray) -> ndarray:
     moments = np.diag(I)
     for k in range(3):
         axial, (first, second) = moments[k], np.delete(moments, k)
-        if first == second != axial:
+        if abs(first - second) <= EQUAL * axial and first != axial:
             return np.where(DIAGONAL, np.diag(np.where(np.arange(3) == k, first, axial)), I)
     return I
 
@@ -107,23 +108,40 @@ def ways_of_vectors(name: str) -> Ways:
 def of_rows(equations: Equations) -> Iterator[Edit]:
     """The tensors, CoMs and offsets of bodies and joints, one, those that are alike, or all."""
     bodies, joints = sets_of_bodies(equations.tree), sets_of_joints(equations.tree)
+    frames = [equations.frame_of(b) for b in range(len(equations.tree.mass))]
+    of_parents = [Frame(np.zeros(3), equations.axes_at(parent)) for parent in equations.tree.parent]
     kinds = (
-        ("inertia", bodies, ways_of_tensors()), ("com", bodies, ways_of_vectors("CoM of {}")),
-        ("offset", joints, ways_of_vectors("offset of {}")),
+        ("inertia", bodies, ways_of_tensors(), frames), ("com", bodies, ways_of_vectors("CoM of {}"), frames),
+        ("offset", joints, ways_of_vectors("offset of {}"), of_parents),
     )  # fmt: skip
-    for field, sets, ways in kinds:
+    for field, sets, ways, axes in kinds:
         for name, rows in sets.items():
             for (place, explains), new in ways.items():
                 after = equations.stated[field].copy()
-                after[rows] = [new(row) for row in after[rows]]
+                for row in rows:
+                    after[row] = in_frame(new, axes[row])(after[row])
                 yield place.format(name), explains, {field: after}
+
+
+def in_frame(new: Way, frame: Frame) -> Way:
+    """The change of a vector or tensor whose components are those in a frame."""
+    origin, R = frame
+
+    def change(row: ndarray) -> ndarray:
+        if row.ndim == 2:
+            return R @ new(R.T @ row @ R) @ R.T
+        return R @ new(R.T @ (row - origin)) + origin
+
+    return change
 
 
 def about_one_axis(equations: Equations) -> Iterator[Edit]:
     """The moment of inertia about one axis left out of every body, as of thin rods."""
     for k, axis in enumerate(XYZ if len(equations.tree.mass) > 1 else ""):
         after = equations.stated["inertia"].copy()
-        after[:, k, k] = 0.0
+        for b, I in enumerate(after):
+            along = equations.frame_of(b).axes[:, k]
+            after[b] = I - along @ I @ along * np.outer(along, along)
         yield f"inertia {axis}{axis} of {EVERY_BODY}", "left out", {"inertia": after}
 
 
@@ -189,10 +207,11 @@ def scaled(equations: Equations) -> Iterator[Edit]:
 
 def axes(equations: Equations) -> Iterator[Edit]:
     """A hinge or slide along another axis of its frame; its other sense is a convention."""
-    for name, joint in zip(equations.tree.joint_names, equations.tree.coordinates.joints):
+    for i, joint in enumerate(equations.tree.coordinates.joints):
+        name, own = equations.tree.joint_names[i], equations.axes_at(i)
         for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0) if joint.kind != "ball"):
             new = equations.stated["axis"].copy()
-            before, new[joint.qd.start] = new[joint.qd.start].copy(), sign * np.eye(3)[k]
+            before, new[joint.qd.start] = new[joint.qd.start].copy(), sign * own[:, k]
             if not np.allclose(new[joint.qd.start], -before):
                 yield f"axis of {name}", f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
 

@@ -76,7 +76,9 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
         com, tensor = numbers[1:4] / mass, np.zeros((3, 3))
         for (_, i, j), x in zip(INERTIA, numbers[4:]):
             tensor[i, j] = tensor[j, i] = x
-        tensor = tensor - point_inertia(com, mass)
+        frame = equations.frame_of(equations.tree.body_names.index(body))
+        tensor = frame.axes.T @ (tensor - point_inertia(com, mass)) @ frame.axes
+        com = frame.axes.T @ (com - frame.origin)
         where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(com) < ZERO, 0.0, com))
         explains, is_known = f"{mass:.5g} kg, CoM ({where}) m", determined[4:].all()
         of_tensor = {name: tensor[i, j] for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass}

@@ -16,7 +16,7 @@ from ..core.cause import Cause
 from ..core.words import listed
 from ..robots.coordinates import Coordinates
 from ..robots.joint_map import within_a_turn
-from .model import Equations, Path
+from .model import WHOLE, Equations, Frame, Path
 
 XYZ = "xyz"
 INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
@@ -124,36 +124,53 @@ def numbers(equations: Equations) -> Iterator[Place]:
         now = float(stated[path.field][path.at])
         return Place("number", name, now, unit, float(size), ((path, 1.0),), least=least)
 
-    def triple(name: str, unit: str, size: float, field: str, *index: int) -> list[Place]:
-        return [number(name.format(axis), unit, size, Path(field, (*index, k))) for k, axis in enumerate(XYZ)]
+    def component(
+        name: str, unit: str, size: float, path: Path, along: np.ndarray, origin: np.ndarray | float = 0.0,
+        least: float = -np.inf,
+    ) -> Place:  # fmt: skip
+        """The component of a vector or tensor along an axis, or the product of two, of the file's frame."""
+        now = float((along * (stated[path.field][path.at] - origin)).sum() / (along * along).sum())
+        moves = [(Path(path.field, (*path.at, *at)), float(x)) for at, x in np.ndenumerate(along) if x]
+        now = 0.0 if abs(now) < WHOLE * size else now
+        return Place("number", name, now, unit, float(size), tuple(moves), least=least)
+
+    def triple(name: str, unit: str, size: float, path: Path, frame: Frame) -> list[Place]:
+        axes = zip(XYZ, frame.axes.T)
+        return [component(name.format(axis), unit, size, path, along, frame.origin) for axis, along in axes]
 
     for b, body in enumerate(tree.body_names):
         heavy = stated["mass"][b] or heaviest
         yield number(f"mass of {body}", "kg", heavy, Path("mass", (b,)), least=0.0)
-        yield from triple(f"CoM {{}} of {body}", "m", length, "com", b)
+        frame = equations.frame_of(b)
+        yield from triple(f"CoM {{}} of {body}", "m", length, Path("com", (b,)), frame)
         size = np.abs(stated["inertia"][b]).max() or heavy * length**2
         for name, i, j in INERTIA:
-            path, mirrored = Path("inertia", (b, i, j)), Path("inertia", (b, j, i))
-            place = number(f"inertia {name} of {body}", "kg m2", size, path, 0.0 if i == j else -np.inf)
-            yield place if i == j else place._replace(moves=((path, 1.0), (mirrored, 1.0)))
+            along = np.outer(frame.axes[:, i], frame.axes[:, j])
+            along, least = (along, 0.0) if i == j else (along + along.T, -np.inf)
+            called = f"inertia {name} of {body}"
+            yield component(called, "kg m2", size, Path("inertia", (b,)), along, least=least)
     for i, (name, joint) in enumerate(zip(tree.joint_names, tree.coordinates.joints)):
         carried = [("com", b) for b, of_joint in enumerate(tree.body_joint) if of_joint == i]
         carried += [("offset", j) for j, parent in enumerate(tree.parent) if parent == i]
-        for k, place in enumerate(triple(f"offset {{}} of {name}", "m", length, "offset", i)):
+        of_parent = Frame(np.zeros(3), equations.axes_at(tree.parent[i]))
+        for place in triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent):
             yield place
             if joint.kind != "slide":
-                stays = [(Path(field, (index, k)), -1.0) for field, index in carried]
-                yield place._replace(name=f"anchor {XYZ[k]} of {name}", moves=(*place.moves, *stays))
+                along = [(path.at[1], x) for path, x in place.moves]
+                stays = [(Path(field, (index, k)), -x) for field, index in carried for k, x in along]
+                anchor = place.name.replace("offset", "anchor", 1)
+                yield place._replace(name=anchor, moves=(*place.moves, *stays))
         if joint.kind != "ball":
             size = length if joint.kind == "slide" else 1.0
             zero = number(f"zero of {name}", unit_of("rad", joint.kind), size, Path("reference", (i,)))
             yield zero._replace(kind=OF_ZERO)
-            yield from triple(f"axis {{}} of {name}", "", 0.5, "axis", joint.qd.start)
+            own = Frame(np.zeros(3), equations.axes_at(i))
+            yield from triple(f"axis {{}} of {name}", "", 0.5, Path("axis", (joint.qd.start,)), own)
         for speed in range(joint.qd.start, joint.qd.stop):
             size = heaviest * (1.0 if joint.kind == "slide" else length**2)
             path, unit = Path("armature", (speed,)), unit_of("kg m2", joint.kind)
             yield number(f"armature of {equations.speeds[speed]}", unit, size, path, least=0.0)
-    yield from triple("gravity {}", "m/s2", 9.81, "gravity")
+    yield from triple("gravity {}", "m/s2", 9.81, Path("gravity", ()), Frame(np.zeros(3), np.eye(3)))
 
 
 def tied(equations: Equations) -> Iterator[Place]:

@@ -19,6 +19,7 @@ from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import LeftOver
 from ..diagnosis.model import Equations, packed
 from ..engines import Dynamics
+from ..engines.mujoco.reading import tree_with_sites
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
@@ -97,6 +98,10 @@ def diagnosed(setup: Setup) -> Found:
     """What explains the difference of the engine that is compared with the robot's Tree; computed once."""
     tree, sample, engine = setup.robot.tree, setup.random.first(STATES_ASKED), setup.robot.compared[0]
     engine = "own" if engine == "own" else "mujoco"
+    if (
+        setup.reading is not None and tree == setup.reading.tree
+    ):  # its numbers are said in the frames of the file
+        tree = tree_with_sites(setup.reading)
     dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
     values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
     if isinstance(dynamics, OwnDynamics):
