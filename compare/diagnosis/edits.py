@@ -5,10 +5,12 @@ Each kind is one function in KINDS, which yields the place, what it explains, an
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 
 import numpy as np
 from numpy import ndarray
+
+import tmt
 
 from ..core.words import listed
 from .model import Changes, Equations, Frame, Path
@@ -216,6 +218,55 @@ def axes(equations: Equations) -> Iterator[Edit]:
                 yield f"axis of {name}", f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
 
 
+def turns(equations: Equations) -> Iterator[Edit]:
+    """The fixed turn of a body in the body before (euler, rpy), or of all bodies: left out, transposed, in another order."""
+    tree, before = equations.tree, [equations.axes_at(parent) for parent in equations.tree.parent]
+    ways: dict[str, Way] = {
+        "left out": lambda turn: turn @ turn.T, "transposed": np.transpose, "angles in the other order": in_other_order,
+        "angles in the other order, z, y, x": lambda turn: in_other_order(turn.T).T,
+    }  # fmt: skip
+    fixed = [before[i].T @ equations.axes_at(i) for i in range(len(before))]
+    turned = [i for i, turn in enumerate(fixed) if not np.allclose(turn, np.eye(3))]
+    sets = {tree.joint_names[i]: [i] for i in turned} | ({"every joint": turned} if len(turned) > 1 else {})
+    for (name, joints), (explains, way) in product(sets.items(), ways.items()):
+        after = {field: equations.stated[field].copy() for field in ("axis", "offset", "com", "inertia")}
+        for i in joints[::-1]:  # from the tips
+            turn(tree, i, after, before[i] @ way(fixed[i]) @ fixed[i].T @ before[i].T)
+        yield f"fixed turn at {name} (euler, quat or rpy)", explains, after
+
+
+def turn(tree: tmt.Tree, joint: int, fields: dict[str, ndarray], by: ndarray) -> None:
+    """Turn all that a joint carries, where all joints are at zero."""
+    carried = [k for k in range(len(tree.parent)) if joint in tree.path(k)]
+    bodies = [b for b, k in enumerate(tree.body_joint) if k in carried]
+    speeds = np.concatenate([np.arange(len(tree.axis))[tree.coordinates.joints[k].qd] for k in carried])
+    for field, rows in {"axis": speeds, "offset": carried[1:], "com": bodies}.items():
+        fields[field][rows] = fields[field][rows] @ by.T
+    fields["inertia"][bodies] = by @ fields["inertia"][bodies] @ by.T
+
+
+def in_other_order(turn: ndarray) -> ndarray:
+    """A turn by angles about x, y, z with the same angles about z, y, x."""
+    x, y, z = angles_of(turn)
+    return about(0, x) @ about(1, y) @ about(2, z)
+
+
+def angles_of(turn: ndarray) -> ndarray:
+    """Roll, pitch and yaw, rad: turn = Rz(yaw) Ry(pitch) Rx(roll)."""
+    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
+    if np.hypot(turn[0, 0], turn[1, 0]) < EQUAL:  # yaw and roll turn about the same axis
+        return np.array([np.arctan2(-turn[1, 2], turn[1, 1]), pitch, 0.0])
+    return np.array([np.arctan2(turn[2, 1], turn[2, 2]), pitch, np.arctan2(turn[1, 0], turn[0, 0])])
+
+
+def about(k: int, angle: float) -> ndarray:
+    """The turn by an angle about an axis."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    turn = np.eye(3)
+    turn[[i, i, j, j], [i, j, i, j]] = np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)
+    return turn
+
+
 KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
-    absent, of_rows, about_one_axis, swapped, scaled, axes,
+    absent, of_rows, about_one_axis, swapped, scaled, axes, turns,
 )  # fmt: skip
