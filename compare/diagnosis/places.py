@@ -23,6 +23,9 @@ INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2),
 EVERY_BODY = "every body"
 COMMON_FACTORS = (-1.0, 0.0, 0.5, 1.0, 2.0)
 OF_ZERO = "zero position"  # the kind of a place
+DEGREES = np.outer(
+    (90, 180, 45, 30, 60, 15, 120, 135, 150, 270), (1.0, -1.0)
+).ravel()  # angles that are written as rad
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 SMALL = 1e-9  # of the other numbers: a number that a regression leaves at 0
 ALL = slice(None)  # entries of a state
@@ -62,9 +65,15 @@ class Place(NamedTuple):
         return self.value(change) >= self.least
 
     def cause(self, change: float) -> Cause:
-        """The change as a cause."""
-        rank, kind, stated, explains = self.rank, self.kind, float(self.stated), self.value(change)
-        return Cause(rank=rank, kind=kind, place=self.name, stated=stated, explains=explains, unit=self.unit)
+        """The change as a cause; of a zero that is a number of degrees taken as rad, this number."""
+        place, unit = self.name, self.unit
+        if self.kind == OF_ZERO and unit == "rad":
+            turns = (change - DEGREES + np.radians(DEGREES)) / (2.0 * np.pi)
+            for angle in np.abs(DEGREES[np.abs(turns - np.round(turns)) < FIT_ROUNDING]).tolist():
+                right = float(np.radians(angle))
+                return Cause(rank=2, kind="number", place=place, stated=right, explains=angle, unit=unit)
+        stated, explains = float(self.stated), self.value(change)
+        return Cause(rank=self.rank, kind=self.kind, place=place, stated=stated, explains=explains, unit=unit)
 
 
 def factor(kind: str, name: str, column: np.ndarray, entries: Entries = ALL, stated: float = 1.0) -> Place:
