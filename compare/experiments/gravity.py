@@ -21,7 +21,7 @@ def rows(setup: Setup) -> Result:
     for comparison in comparisons:
         engine, mujoco, *_ = comparison.engines
         sample, scale, (held, *_) = comparison.sample, comparison.scale, comparison.values("holding torque")
-        if "gravity" in setup.robot.own:
+        if {"gravity", "bias"} <= {*setup.robot.own}:
             still = engine.bias(sample.q, np.zeros(tree.coordinates.nv))
             comparison.agree("yours: gravity - bias at rest", units, held, still, scale.weight)
         if tree.has_springs:
