@@ -20,10 +20,10 @@ from compare.engines.mujoco.smaller import Smaller, finished
 from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
-from compare.experiments.reduction.limits import stable_answers
+from compare.experiments.reduction.limits import compared_limits, stable_answers
 from compare.experiments.reduction.records import FrontierRow, ReductionResult
 from compare.experiments.reduction.scene import scene_of
-from compare.experiments.reduction.search import Candidate, answer_within, take_out
+from compare.experiments.reduction.search import answer_within, take_out
 from compare.experiments.setup import Request
 from compare.robots.scene_file import SceneError, read_controls, read_scenes
 from compare.run.reference import compared_with
@@ -344,21 +344,16 @@ DAMPED = """<mujoco><option integrator="RK4" timestep="{}"/><worldbody><body><jo
 
 
 def test_no_answer_is_a_step_that_is_unstable_at_rest():
-    """A robot that rests exactly stays at any step: the run shows nothing."""
-    result = answered(DAMPED.format(1e-3, 0.0))
-    rows = result.tables["reduction_frontier"]
-    (limit,) = [
-        row for row in result.tables["reduction_limits"] if (row.model, row.integrator) == ("smaller", "RK4")
-    ]
-    assert 1e-3 < limit.step < 8e-3
-    told = [row for row in rows if row.best_for]
-    assert told and all(row.integrator != "RK4" or row.dt <= limit.step for row in told)
-    only_rk4 = [row for row in rows if row.integrator == "RK4"]
-    assert max(row.error for row in only_rk4 if row.dt > limit.step) < 1e-3  # its run shows nothing
-    scene_at_rest = scene(DAMPED.format(1e-3, 0.0))
-    candidates = [Candidate(replace(row, gain=row.dt), scene_at_rest.whole, frozenset()) for row in only_rk4]
-    answers = stable_answers(scene_at_rest, candidates, [1e-3])
-    assert answers[0].row.dt == max(row.dt for row in only_rk4 if row.dt <= limit.step)
+    """A robot that rests exactly stays at any step: its run shows nothing."""
+    rests = scene(DAMPED.format(1e-3, 0.0))
+    candidates = search.frontier(rests, search.Locks(rests, rests.whole), [1e-3], int)
+    candidates = [candidate for candidate in candidates if candidate.row.integrator == "RK4"]
+    for candidate in candidates:
+        candidate.row.gain = candidate.row.dt
+    (answer,) = stable_answers(rests, candidates, [1e-3])
+    assert max(candidate.row.dt for candidate in candidates) == 8e-3
+    (limit,) = compared_limits(rests, rests.whole, ["RK4"])[1:]
+    assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
 
 
 def test_a_file_whose_own_run_fails_is_not_judged():
