@@ -121,26 +121,17 @@ def add_tables(
 def use_of(scene: Scene) -> list[UseRow]:
     """What the file has and the motion used."""
     use, model = scene.use, scene.whole.model
-    collide = (model.geom_contype | model.geom_conaffinity) != 0
-    parts = {
-        "geoms that touch": (collide.sum(), use.geoms),
-        "pairs that touch": (None, {" and ".join(pair) for pair in use.pairs}),
-        "limits of joints": (model.jnt_limited.sum(), use.acted["joint"]),
-        "limits and friction of tendons": (model.ntendon, use.acted["tendon"]),
-        "equalities": (model.neq, use.acted["equality"]),
-        "actuators": (number_of_actuators(model), use.acted["actuator"]),
-        "sensors": (model.nsensor, set()),  # no controller reads them
-        "joints that move": (model.njnt, {name for name, moved in use.ranges.items() if moved > STILL}),
-    }
-    return [
-        UseRow(
-            part=part,
-            in_file=count if count is None else int(count),
-            used=len(names),
-            names=", ".join(sorted(names)),
-        )
-        for part, (count, names) in parts.items()
+    parts: list[tuple[str, int | None, set[str]]] = [
+        ("geoms that touch", int(((model.geom_contype | model.geom_conaffinity) != 0).sum()), use.geoms),
+        ("pairs that touch", None, {" and ".join(pair) for pair in use.pairs}),
+        ("limits of joints", int(model.jnt_limited.sum()), use.acted["joint"]),
+        ("limits and friction of tendons", model.ntendon, use.acted["tendon"]),
+        ("equalities", model.neq, use.acted["equality"]),
+        ("actuators", number_of_actuators(model), use.acted["actuator"]),
+        ("sensors", model.nsensor, set()),  # no controller reads them
+        ("joints that move", model.njnt, {name for name, moved in use.ranges.items() if moved > STILL}),
     ]
+    return [UseRow(part, count, len(names), ", ".join(sorted(names))) for part, count, names in parts]
 
 
 def add_checks(
