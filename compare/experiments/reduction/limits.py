@@ -4,7 +4,6 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...engines.mujoco.motion import Path, data_at, movements
 from ...engines.mujoco.reading import read
 from ...engines.mujoco.smaller import Smaller, finished
 from ...engines.mujoco.source import without_visuals
@@ -52,21 +51,14 @@ def is_stable(place: Place | None, row: FrontierRow) -> bool:
 
 
 def compared_limits(scene: Scene, small: Smaller, integrators: Sequence[str]) -> list[LimitRow]:
-    """The step limits of the whole and of the smaller file, and how far apart the two rest."""
-    rows, rests = [], dict[str, Path]()
+    """The step limits of the whole and of the smaller file."""
+    rows, asked = [], Asked(scene.reading.dt, scene.reading.integrator, (), in_runs=False)
     for model, file in (("whole", scene.whole), ("smaller", small)):
         place = rest_of(scene, file)
         for integrator in integrators:
             row = LimitRow(model, integrator, "rests_elsewhere")
+            if place:
+                answer, _ = limit_row(place, integrator, asked)
+                row = LimitRow(model, integrator, answer.limit, answer.predicted_dt, answer.limiting_joint)
             rows.append(row)
-            if place is None:
-                continue
-            asked = Asked(scene.reading.dt, scene.reading.integrator, (), in_runs=False)
-            answer, limit = limit_row(place, integrator, asked)
-            row.limit, row.step, row.joint = answer.limit, answer.predicted_dt, answer.limiting_joint
-            q = data_at(place.model, limit.rest.state).qpos[None].copy()
-            rest = Path(place.model, scene.reading.dt, q, q)
-            differences = movements(rest, rests.setdefault(integrator, rest))
-            row.apart_joint = max(differences, key=differences.__getitem__)
-            row.apart = differences[row.apart_joint]
     return rows

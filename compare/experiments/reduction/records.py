@@ -83,18 +83,13 @@ class PairRow(Row):
 
 @dataclass
 class LimitRow(Row):
-    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv, or rests_elsewhere.
-
-    apart: the largest difference of a joint at the rest, just below the limit, from that of the whole file, rad or m.
-    """
+    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv, or rests_elsewhere."""
 
     model: str
     integrator: str
     limit: str
     step: float | None = column("s", digits=4, default=None)
     joint: str = ""
-    apart: float | None = None
-    apart_joint: str = ""
 
 
 @dataclass(kw_only=True)
