@@ -356,6 +356,20 @@ def test_no_answer_is_a_step_that_is_unstable_at_rest():
     assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
 
 
+def test_bodies_that_the_file_fuses_are_fused_in_the_smaller_one_too():
+    """As those of a URDF: the whole file has one body less than is read of it."""
+    tool = '<body pos="0 0 -0.1"><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.2 0.3"/><geom size="0.01"/></body>'
+    fused = TWO_ARMS.replace("<mujoco>", '<mujoco><compiler fusestatic="true"/>').replace(
+        '<site name="left', tool + '<site name="left'
+    )
+    result = answered(fused, controls=waves("left upper"))
+    assert [str(check) for check in result.checks if not check.passed] == []
+    assert {row.joint for row in result.tables["reduction_joints"] if row.locked} >= {
+        "right upper",
+        "right lower",
+    }
+
+
 def test_a_file_whose_own_run_fails_is_not_judged():
     result = answered(DAMPED.format(0.02, 1.0))
     (check,) = result.checks
