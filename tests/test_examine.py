@@ -141,7 +141,7 @@ def plot(result, name):
 
 
 def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, monkeypatch):
-    names, log = ["mass", "speed", "stability", "reduction"], []
+    names, log = ["mass", "speed", "stability", "derivatives"], []
 
     def rows(name, setup):
         log.append(("rows", name))
@@ -156,7 +156,7 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
-        ("rows", "reduction"), ("figures", "speed"), ("figures", "reduction"),
+        ("rows", "derivatives"), ("figures", "speed"), ("figures", "derivatives"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     for section_of_name, name in zip(sections, names):

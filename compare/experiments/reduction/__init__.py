@@ -1,7 +1,6 @@
 """What each scene needs of the model: the joints that can be locked without changing its motion."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -15,7 +14,7 @@ from ...robots import Robot
 from ...robots.case import Case
 from ...truth.smallest import needed
 from .. import Experiment
-from ..setup import Setup, nothing
+from ..setup import Setup
 from . import of_file
 from .exact_motion import compare_swing, is_pendulum
 from .records import Need, NeedRow, ReductionResult
@@ -25,7 +24,6 @@ EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
-    timed=True,
 )
 
 
@@ -34,18 +32,30 @@ def claim_values(robot: Robot) -> dict[str, str | float]:
     return {"joint": joint, "digits": DIGITS, "eps": FACTOR}
 
 
-def begin(setup: Setup) -> Iterable[ReductionResult]:
-    """Start all but the motion of a file, in parallel with other work."""
-    alone = replace(setup, map=map, quiet=nothing, progress=nothing, reading=None)
-    return setup.map(untimed, [alone])
-
-
-def rows(setup: Setup, work: Iterable[ReductionResult] | None = None) -> ReductionResult:
+def rows(setup: Setup) -> ReductionResult:
     """Sub-blocks with joints locked; of a file what its motion needs, of the arm what each scene needs; exact swings."""
-    (result,) = begin(setup) if work is None else work
-    if setup.alone and setup.reading and not setup.robot.is_stated:
+    result, robot = ReductionResult("reduction"), setup.robot
+    if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
+        result.find("driven", scenes=driven)
+    try:
+        if robot.is_stated or not setup.alone:  # else the locks of the smaller file are compared
+            compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
+        for case in robot.cases_of_torque:
+            if not robot.is_read:
+                add_need(result, case)
+            if is_pendulum(case):
+                compare_swing(result, setup, case)
+    except ModelError as error:
+        if robot.is_read:
+            result.top.append(result.finding("not_lockable", error=str(error)))
+        else:
+            quantity = "models whose hinges can be locked"
+            result.check(
+                "every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM
+            )
+    if setup.alone and setup.reading and not robot.is_stated:
         of_file.add(result, setup, setup.reading)
-    result.top += answers(result, setup.robot)
+    result.top += answers(result, robot)
     return result
 
 
@@ -67,30 +77,6 @@ def add_need(result: ReductionResult, case: Case) -> None:
     rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
     result.tables.setdefault("reduction_needs", []).extend(rows)
     result.needs[case.name] = Need(names, case.scene.locked, need.stays)
-
-
-def untimed(setup: Setup) -> ReductionResult:
-    """All but the motion of a file, whose runs are timed."""
-    result, robot = ReductionResult("reduction"), setup.robot
-    if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
-        result.find("driven", scenes=driven)
-    try:
-        if robot.is_stated or not setup.alone:  # else the locks of the smaller file are compared
-            compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
-        for case in robot.cases_of_torque:
-            if not robot.is_read:
-                add_need(result, case)
-            if is_pendulum(case):
-                compare_swing(result, setup, case)
-    except ModelError as error:
-        if robot.is_read:
-            result.top.append(result.finding("not_lockable", error=str(error)))
-        else:
-            quantity = "models whose hinges can be locked"
-            result.check(
-                "every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM
-            )
-    return result
 
 
 def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:

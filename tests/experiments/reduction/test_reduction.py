@@ -34,7 +34,7 @@ def test_a_small_run_has_what_each_scene_needs_and_the_exact_swing(small):
 
 def test_a_model_whose_joints_cannot_be_locked_fails():
     tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
-    (check,) = reduction.untimed(setup_of(XML.replace("</mujoco>", tendon))).checks
+    (check,) = reduction.rows(setup_of(XML.replace("</mujoco>", tendon))).checks
     assert check.quantity == "models whose hinges can be locked" and not check.passed
 
 
@@ -92,7 +92,7 @@ def test_of_many_joints_some_are_locked_each_alone():
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
-    result = reduction.untimed(setup_of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
+    result = reduction.rows(setup_of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
     assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
 
 
