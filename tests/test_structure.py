@@ -22,7 +22,7 @@ DIRECTIONS = {
     "agreement": "tmt core diagnosis engines judge robots", "engines": "tmt core robots judge process",
     "stability": "tmt core robots engines", "truth": "tmt core robots stability",
     "diagnosis": "tmt core robots judge", "report": "core process robots",
-    "experiments": "tmt core robots engines stability truth judge diagnosis report",
+    "experiments": "tmt core robots engines stability truth judge diagnosis agreement report",
     "run": "tmt core robots engines stability judge process report experiments", "cli": "core experiments process report",
     "fleet": "tmt core robots engines judge process report experiments run cli",
     "export": "tmt core robots engines judge process report experiments run cli",
