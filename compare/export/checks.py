@@ -161,7 +161,7 @@ def times(
             calls[name, flag], _ = program.call(name, states, library)
     if not MinimalCalls.unavailable():
         loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(*(x[0] for x in states[:3]))
-        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"][1], count)
+        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"], count)
     seconds = timing.fastest(calls, ROUNDS, time.thread_time)
     ns = {key: 1e9 * taken / count for key, taken in seconds.items()}
     rows = []
