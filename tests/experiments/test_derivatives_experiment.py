@@ -41,7 +41,8 @@ def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_deriva
     assert 1e-10 < values["inverse"].error < 1e-5 and values["exact"].error < 1e-12
     values = {**values, "centred": dataclasses.replace(centred, eps=1e-5, unit="m per N", largest=3.0)}
     said = say(Finding("derivatives", "advice", values))
-    assert "use eps 1e-05, centred" in said and "m per N, of 3)" in said
+    assert "differences: use eps 1e-05, centred" in said and "m per N, of 3)" in said
+    assert "contacts left out: use" in say(Finding("derivatives", "advice", values | {"in_air": True}))
 
 
 def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
