@@ -172,12 +172,9 @@ def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: 
     costs: list[CostRow] = []
     for quantity, way in dict.fromkeys((row.quantity, row.way) for measured in main for row in measured.rows):
         same = [row for row in scenes if (row.quantity, row.way) == (quantity, way)]
-        best, usual = ways.best_of(same), ways.worst_of_each_eps(same).get(ways.USUAL)
-        seconds = result.times.get((quantity, way))
-        costs.append(CostRow(
-            quantity=quantity, way=way, best_eps=best.eps, error=best.error,
-            error_at_usual=usual.error if usual else None, time=None if seconds is None else 1e6 * seconds,
-        ))  # fmt: skip
+        best, seconds = ways.best_of(same), result.times.get((quantity, way))
+        time = None if seconds is None else 1e6 * seconds
+        costs.append(CostRow(quantity=quantity, way=way, best_eps=best.eps, error=best.error, time=time))
     result.tables["derivative_costs"] = costs
     timed = [row for row in costs if row.time]
     pairs = [(row, of_mujoco(timed, row.quantity)) for row in timed if row.way == ways.COMPILED]
