@@ -45,10 +45,10 @@ def growth(rest: Rest) -> Growth:
     still = Growth(1.0, 0.0, np.zeros(len(rest.A)))
     if not np.isfinite(rest.A).all():
         return Growth(np.inf, np.inf, still.shape)
+    if np.abs(np.linalg.eigvals(rest.A)).max(initial=0.0) <= 1.0 + GROWS * rest.step.dt:
+        return still
     values, left, right = eig(rest.A, left=True, right=True)
     excess = np.abs(values) - 1.0
-    if excess.max(initial=0.0) <= GROWS * rest.step.dt:
-        return still
     noise = rest.A - rest.step.derivative(rest.state, OTHER_NUDGE)
     overlap = np.maximum(np.abs((left.conj() * right).sum(axis=0)), 1e-300)
     uncertain = NOISE_TIMES * np.abs((left.conj() * (noise @ right)).sum(axis=0)) + NOISE_LEAST

@@ -10,7 +10,7 @@ from ..engines.mujoco.step import Step, distance
 from .growth import GROWS, Growth, grows, growth
 from .rest import Rest, rest_near
 
-LONGEST, SHORTEST = 0.4, 1e-6  # s: steps that are tried
+LONGEST, SHORTEST = 0.2, 1e-6  # s: steps that are tried
 COARSER = 1.5  # fold, from one tried step to the next
 REFINED = 2e-3  # of a limit
 SLOW = 1.2  # a factor below: of what grows little in a step
@@ -57,18 +57,10 @@ class Limit:
     def first(self) -> Tried:
         return self.tries[0]
 
-    def state_below(self, dt: float) -> np.ndarray:
-        """The rest of the search nearest below a step, s: from there the one at the step is followed."""
-        below = self.stable_below(dt)
-        return max(below, key=lambda at: at.dt).rest.state if below else self.rest.state
-
     def creep_near(self, dt: float) -> float:
         """The largest speed at the rests of the search up to a step, s, and the next coarser one."""
-        speeds = [np.abs(at.rest.speeds).max(initial=0.0) for at in self.stable_below(COARSER * dt)]
-        return float(max(speeds, default=0.0))
-
-    def stable_below(self, dt: float) -> list[Tried]:
-        return [at for at in self.tries if at.is_stable and at.dt <= dt]
+        near = [at.rest for at in self.tries if at.is_stable and at.dt <= COARSER * dt]
+        return float(max((np.abs(rest.speeds).max(initial=0.0) for rest in near), default=0.0))
 
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
