@@ -146,14 +146,14 @@ def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> 
     place = standing if contacts else in_the_air_at(standing)
     if place is None:
         return PlaceAnswer([], {}, [])
-    rows, curves = [], {}
+    rows, curves, changes = [], {}, []
     for integrator in asked.integrators:
         row, found = limit_row(place, integrator, asked)
         rows.append(row)
         if asked.drawn and row.is_known:
             curves[integrator] = curve(place, row, found)
-    fails = [row for row in rows if row.integrator == asked.integrator and row.stable_at_file_dt is False]
-    changes = cures(place.model, place.rest, asked.dt, asked.integrator) if fails and contacts else []
+        if contacts and integrator == asked.integrator and row.stable_at_file_dt is False:
+            changes = cures(runs_of(place, found, integrator, asked.dt), asked.dt)
     return PlaceAnswer(rows, curves, changes)
 
 

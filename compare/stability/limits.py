@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .growth import GROWS, Growth, grows, growth
+from .growth import GROWS, Growth, growth
 from .rest import Rest, rest_near
 
 LONGEST, SHORTEST = 0.2, 1e-6  # s: steps that are tried
@@ -29,12 +29,11 @@ class Tried:
     growth: Growth
     drift: float
     moved: float  # rad or m, of the rest from the state from which it was sought
-    run_grows: bool  # where the derivative is uncertain: whether a small push grows in a run
 
     @property
     def is_stable(self) -> bool:
         stays = self.rest.is_found and self.moved <= GIVES_WAY
-        return stays and not self.run_grows and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
+        return stays and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
 
 
 @dataclass(frozen=True)
@@ -67,8 +66,7 @@ def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, 
     """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""
     rest = rest_near(Step(model, dt, integrator), state)
     moved = float(np.abs(distance(model, state, rest.state)).max(initial=0.0))
-    found = growth(rest)
-    return Tried(dt, rest, found, drift, moved, found.is_uncertain and grows(rest))
+    return Tried(dt, rest, growth(rest), drift, moved)
 
 
 def limit(

@@ -18,10 +18,9 @@ from compare.engines.mujoco.variants import (
 )
 from compare.stability import cures
 from compare.stability.control import controlled
-from compare.stability.growth import grows, growth, has_grown
+from compare.stability.growth import growth, has_grown
 from compare.stability.limits import Limit, tried
 from compare.stability.motion import motion
-from compare.stability.rest import rest_near
 from compare.stability.runs import PUSHES, USUAL_PUSH, Runs, growth_in_run, upwards
 
 WITH_KV = hinge(20.0, 5.0)
@@ -231,8 +230,9 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula():
     """4 I > 2 dt kv + dt^2 kp, 1 % above the step."""
     kp, kv, dt, inertia = 20.0, 30.0, 0.02, INERTIA + 0.01
     place, above = place_of(hinge(kp, kv, 'armature="0.01"')), 0.02 * cures.SPARE
-    assert grows(rest_near(Step(place.model, dt, "Euler"), place.rest))
-    found = {cure.change: cure.factor for cure in cures.cures(place.model, place.rest, dt, "Euler")}
+    shown = runs_of(hinge(kp, kv, 'armature="0.01"'))
+    assert not shown.survives(1e-3, dt)
+    found = {cure.change: cure.factor for cure in cures.cures(shown, dt)}
     less = 2.0 * above * kv / (4.0 * inertia - above**2 * kp)
     more = (2.0 * above * kv + above**2 * kp) / (4.0 * inertia) - 1.0
     assert found.keys() == {"less_kv", "more_armature"}
@@ -242,18 +242,19 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula():
         with_kv(place.model, 1.0 / found["less_kv"]),
         with_armature(place.model, found["more_armature"]),
     )
-    assert not any(grows(rest_near(Step(changed, dt, "Euler"), place.rest)) for changed in (weaker, heavier))
+    assert all(replace(shown, model=changed).survives(1e-3, dt) for changed in (weaker, heavier))
 
 
 def test_what_helps_a_standing_leg_holds_in_a_run_and_half_of_it_does_not():
     place, dt = place_of(FOOT), 1.3 * limit_of(FOOT, "implicitfast").dt
     made = {change.name: change for change in cures.CHANGES}
-    found = cures.cures(place.model, place.rest, dt, "implicitfast")
+    shown = runs_of(FOOT, "implicitfast")
+    found = cures.cures(shown, dt)
     assert {cure.change for cure in found} & {"less_kv", "more_armature", "slower_contacts"}
     for cure in found:
         change = made[cure.change]
         changed = change.made(place.model, cure.factor)
-        assert not grows(rest_near(Step(changed, dt, "implicitfast"), place.rest))
+        assert replace(shown, model=changed).survives(1e-6, dt)
         if cure.factor > change.first * cures.WITHIN**2:
             less = change.made(place.model, cure.factor / cures.WITHIN**2)
             assert not tried(less, place.rest, cures.SPARE * dt, "implicitfast").is_stable
