@@ -53,7 +53,7 @@ class StepLimitRow(Row):
     smooth_dt: float | None = step_column(default=None)
     file_dt: float = column("s")
     file_integrator: str
-    stable_at_file_dt: bool | None
+    stable_at_file_dt: bool | None = None
     limiting_joint: str = ""
     limiting_contact: str = ""
     growth_rate: float | None = column("per_s", default=None)
@@ -176,14 +176,15 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     """The limit of an integrator at a place, what the step in use does there, and the search for it."""
     model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
-    if found.kind == "saddle" and not leaves(place, found, integrator, dt):
+    if found.kind == "saddle" and runs_of(place, found, integrator, dt).is_calm(runs.LIMIT_PUSH, dt):
+        # friction or a stop holds, or what grows remains small
         found = limit(model, place.rest, integrator, dt, found.growth.rate)
     at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
     joint, contact = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
         posture=place.posture.name, base="free" if has_free_base(place.reading.model) else "fixed",
         surroundings=place.surroundings, integrator=integrator, limit=found.kind.replace(" ", "_"),
-        predicted_dt=found.dt, file_dt=dt, file_integrator=asked.integrator, stable_at_file_dt=holds(found, dt),
+        predicted_dt=found.dt, file_dt=dt, file_integrator=asked.integrator,
         limiting_joint=joint, limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,
         has_fallen=place.has_fallen, moved=float(moved.max()), moved_joint=place.speed_names[int(np.argmax(moved))],
         held_objects=place.held_objects,
@@ -195,12 +196,13 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     moves = found.kind == "no rest" or (place.is_touching and place.creep > MOVING)
     if moves and found.kind != "saddle" and not place.falls:
         row.limit, row.predicted_dt = "moving", None
-    if row.is_known and (
-        place.contacts or integrator == asked.integrator
-    ):  # in the air the others have no use
+    is_asked = place.contacts or integrator == asked.integrator  # in the air the others have no use
+    if row.is_known and is_asked:
         if asked.in_runs or row.limit == "moving":
             add_runs(row, place, found)
         add_smooth_limit(row, place)
+    if row.is_known:
+        row.stable_at_file_dt = dt <= row.longest
     return row, found
 
 
@@ -214,12 +216,6 @@ def runs_of(place: Place, found: Limit, integrator: str, longest: float) -> runs
     return runs.Runs(place.model, place.rest, integrator, fine, found.first.rest.is_held, creep_at)
 
 
-def leaves(place: Place, saddle: Limit, integrator: str, dt: float) -> bool:
-    """Whether runs leave a saddle of the derivative: not where friction or a stop holds, or what grows remains small."""
-    shown = runs_of(place, saddle, integrator, dt)
-    return not shown.is_calm(runs.LIMIT_PUSH, dt)
-
-
 def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     """What runs show; they have the last word."""
     shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
@@ -228,8 +224,7 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
         row.creep = shown.speed_after(runs.LIMIT_PUSH, shown.fine, runs.lasting(shown.fine))
         row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
     row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)
-    row.stable_at_file_dt = row.file_dt <= row.longest
-    if row.limit != "moving":
+    if row.limit != "moving" and row.file_dt <= row.longest:
         row.largest_push, row.finer_push = shown.largest_push(row.file_dt)
 
 
@@ -240,13 +235,6 @@ def add_smooth_limit(row: StepLimitRow, place: Place) -> None:
         return
     if not tried(place.frictionless, place.rest, UNHELD * longest, row.integrator).is_stable:
         row.smooth_dt = limit(place.frictionless, place.rest, row.integrator, row.file_dt).dt
-
-
-def holds(found: Limit, dt: float) -> bool | None:
-    """Whether a step is within a limit; None: there is none of the step alone."""
-    if found.kind in ("saddle", "no rest"):
-        return None
-    return found.kind == "none" or (found.dt is not None and dt <= found.dt)
 
 
 def limiting(place: Place, rest: Rest, growth: Growth) -> tuple[str, str]:

@@ -34,7 +34,7 @@ EDITS = (
      "the longest period is the shortest that is tried"),
     ("stability.motion", "motion", "dt / FINER", "dt", "a motion is exact at its own step"),
     ("stability.motion", "growth_along", "product / size", "product", "what has grown is counted again and again"),
-    ("stability.cures", "least_factor", "None if _1 else high", "2.0 * high", "twice the least change is the least"),
+    ("stability.cures", "least_factor", "high if _1 else None", "2.0 * high", "twice the least change is the least"),
     ("naming", "limiting", "taken > most", "taken < most", "the contact that takes least limits"),
     ("stability.answer", "StepLimitRow.longest", "self.decided_by_runs", "False", "the file's own run says nothing"),
     ("stability.answer", "add_smooth_limit", "limit(place.frictionless, *_1)", "limit(place.model, *_1)", "dry friction stays"),
