@@ -24,9 +24,9 @@ SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
 CURVE_RUNS = 0.8, 1.05, 1.15, 1.4, 2.0  # of a limit: steps of runs beside its curve
 
 
-def step_column(**more: Any) -> Any:
+def step_column(digits: int = 4, **more: Any) -> Any:
     """A field with a time step, s."""
-    return column("s", digits=4, **more)
+    return column("s", digits=digits, **more)
 
 
 @dataclass(kw_only=True)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from scipy.linalg import eig
 
-from ..engines.mujoco.step import NUDGE, Step
+from ..engines.mujoco.step import LITTLE, NUDGE, Step
 from ..robots.case import SEED
 from .rest import Rest
 
@@ -17,7 +17,6 @@ NOISE_LEAST = 1e-10  # of an entry of the derivative
 GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
 SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
 LASTS, MOST_STEPS = 4.0, 20_000  # s: of a run, and at most so many steps
-LITTLE = 1e-6  # of an activation
 GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 
 

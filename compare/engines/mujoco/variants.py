@@ -16,16 +16,14 @@ def copied(model: mujoco.MjModel) -> mujoco.MjModel:
 
 def has_free_base(model: mujoco.MjModel) -> bool:
     """Whether a base would fall: it has a free joint, or slides along gravity on a joint that nothing drives or stops."""
-    on_joint = model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT
-    driven = set(model.actuator_trnid[on_joint, 0].tolist())
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = np.abs(data.xaxis @ model.opt.gravity) > 0.1 * np.linalg.norm(model.opt.gravity)
-    held = (model.jnt_stiffness != 0.0) | (model.jnt_limited != 0)
     of_world = model.body_parentid[model.jnt_bodyid] == 0
-    kinds = [kind_of(model, joint) for joint in range(model.njnt)]
-    slides = np.flatnonzero(along & of_world & ~held).tolist()
-    return "free" in kinds or any(kinds[joint] == "slide" and joint not in driven for joint in slides)
+    slides = (model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE) & along & of_world
+    slides &= (model.jnt_stiffness == 0.0) & (model.jnt_limited == 0)
+    slides[model.actuator_trnid[model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT, 0]] = False
+    return bool((slides | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)).any())
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
