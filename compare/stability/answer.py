@@ -176,7 +176,7 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     """The limit of an integrator at a place, what the step in use does there, and the search for it."""
     model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
-    if found.kind == "saddle" and runs_of(place, found, integrator, dt).is_calm(runs.LIMIT_PUSH, dt):
+    if found.kind == "saddle" and runs_of(place, found, integrator, dt).is_calm(runs.LIMIT_PUSHES[0], dt):
         # friction or a stop holds, or what grows remains small
         found = limit(model, place.rest, integrator, dt, found.growth.rate)
     at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
@@ -221,7 +221,7 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
     if row.limit == "moving":
         shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep_at=lambda dt: 0.0)
-        row.creep = shown.speed_after(runs.LIMIT_PUSH, shown.fine, runs.lasting(shown.fine))
+        row.creep = shown.speed_after(runs.LIMIT_PUSHES[0], shown.fine, runs.lasting(shown.fine))
         row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
     row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)
     if row.limit != "moving" and row.file_dt <= row.longest:

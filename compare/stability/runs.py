@@ -15,7 +15,7 @@ from .rest import WILD, Rest
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
 WITHIN = 1.065  # fold: how near they are where they differ elsewhere
 CURVE_STEPS, LEAST_SIZES = 400, 16  # of a run that shows how fast a push grows, and while it is small
-LIMIT_PUSH = 1e-3  # rad/s or m/s: at the start of runs that show a limit
+LIMIT_PUSHES = 1e-3, 1e-6  # rad/s or m/s: at the start of runs that show a limit
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest
@@ -104,10 +104,11 @@ class Runs:
         return speed <= AS_FAST * self.speed_after(push, self.fine, lasting(dt))
 
     def hold(self, dt: float) -> bool:
-        """Whether the robot stays at rest after a small push, or leaves it in a run of fine steps, too, as a drone does."""
-        if self.survives(LIMIT_PUSH, dt):
-            return True
-        return self.speed_after(LIMIT_PUSH, self.fine, lasting(dt)) == np.inf
+        """Whether the robot stays at rest after small pushes, or leaves it in runs of fine steps, too, as a drone does."""
+        return all(
+            self.survives(push, dt) or self.speed_after(push, self.fine, lasting(dt)) == np.inf
+            for push in LIMIT_PUSHES
+        )
 
     def limit(self, dt: float, predicted: float) -> tuple[float | None, float | None]:
         """The longest step at which runs hold and the shortest at which they fail, s.
