@@ -90,6 +90,21 @@ def test_what_is_wrong_is_seen_where_it_acts(folder, asked, names, where, quanti
     assert "runs to its end" not in quantities
 
 
+def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
+    names = [*STATIC, "trajectory", "diagnosis"]
+    asked = [name for name in names if not skipped(name, examined(folder, "mine.py:alone", []).robot)]
+    assert asked == ["acceleration", "trajectory", "diagnosis"]
+    assert not examined(folder, "mine.py:alone", asked).failed
+    assert not examined(folder, "mine.py:inverse", STATIC).failed
+    for reference, place in (
+        ("alone_sign", "h[hip], coefficient of knee'^2"),
+        ("alone_damped", "damping of hip"),
+    ):
+        run = examined(folder, f"mine.py:{reference}", ["acceleration", "diagnosis"])
+        assert run.causes[0].place == place
+        assert {check.experiment for check in run.failed} == {"acceleration", "diagnosis"}
+
+
 def test_trajectories_are_those_of_rk4(folder):
     run = examined(folder, "mine.py:Object", ["trajectory"])
     assert run.sections[0].result.checks and not run.failed

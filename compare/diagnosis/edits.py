@@ -18,7 +18,8 @@ from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
 from .variants import Variant, variant
 
 UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
-    "lengths": ((1e3, 1e2, 1e-3, 1e-2), ("offset", "com")), "masses": ((1e3, 1e-3), ("mass",)),
+    "lengths": ((1e3, 1e2, 1e-3, 1e-2, 1.0 / 0.0254, 0.0254), ("offset", "com")),
+    "masses": ((1e3, 1e-3, 1.0 / 0.45359237, 0.45359237), ("mass",)),
     "moments of inertia": ((1e3, 1e4, 1e6, 1e7, 1e9, 1e-3), ("inertia",)),
 }  # fmt: skip
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
