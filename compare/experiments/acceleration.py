@@ -11,10 +11,10 @@ from ..core.check import Result
 from ..engines import WHOSE
 from ..judge.entries import unit
 from . import Experiment
-from .quantities import check_wide, compared, figures, headline, overview
+from .quantities import check_wide, compared, headline, overview
 from .setup import Setup
 
-__all__ = ["EXPERIMENT", "figures", "headline", "overview", "rows"]
+__all__ = ["EXPERIMENT", "headline", "overview", "rows"]
 EXPERIMENT = Experiment(order=60, options=("--joints",), diagnosed=True, overview="agreement")
 
 

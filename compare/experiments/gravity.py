@@ -7,10 +7,10 @@ from tmt import literal
 from ..core.check import Result
 from ..judge.entries import unit
 from . import Experiment
-from .quantities import compared, figures, headline
+from .quantities import compared, headline
 from .setup import Setup
 
-__all__ = ["EXPERIMENT", "figures", "headline", "rows"]
+__all__ = ["EXPERIMENT", "headline", "rows"]
 EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias"), options=("--joints",), diagnosed=True)
 
 

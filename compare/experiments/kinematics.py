@@ -3,10 +3,10 @@
 from ..core.check import Result
 from ..robots import Robot
 from . import Experiment
-from .quantities import QUANTITIES, compared, figures, headline
+from .quantities import QUANTITIES, compared, headline
 from .setup import Setup
 
-__all__ = ["EXPERIMENT", "claim_values", "figures", "headline", "rows"]
+__all__ = ["EXPERIMENT", "claim_values", "headline", "rows"]
 EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
 
 

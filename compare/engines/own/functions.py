@@ -52,7 +52,7 @@ MOST_SHOWN = 8  # numbers of a state in a message
 
 
 class OwnError(ValueError):
-    """A user's equations that cannot be used at all; the message is one line."""
+    """A user's equations that cannot be loaded or used; the message is one line."""
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
