@@ -135,7 +135,7 @@ def test_what_nothing_explains_is_drawn_along_the_coordinate_that_tells_most(fol
     curve = section.result.curve
     assert (curve.entry, curve.coordinate) == ("h[hip]", "knee") and not run.causes
     assert np.ptp(curve.yours - curve.right) == pytest.approx(2.0, rel=0.03)
-    assert [name for name, _ in section.figures] == ["diagnosis_nearest", "diagnosis_curve"]
+    assert [name for name, _ in section.figures] == ["diagnosis_curve"]
 
 
 @pytest.mark.parametrize("asked, joints, right", [

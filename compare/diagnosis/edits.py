@@ -163,6 +163,13 @@ def absent(equations: Equations) -> Iterator[Edit]:
         yield name, "left out", fields
 
 
+def concentrated(equations: Equations) -> Iterator[Edit]:
+    """The mass of all bodies at the CoM of one of them."""
+    mass = equations.stated["mass"]
+    for name, at in zip(equations.tree.body_names, np.eye(len(mass))):
+        yield "masses of every body", f"at the CoM of {name}", {"mass": mass.sum() * at}
+
+
 def swapped(equations: Equations) -> Iterator[Edit]:
     """Numbers of two bodies or joints exchanged; the length and the CoM of a link exchanged."""
     tree, stated = equations.tree, equations.stated
@@ -269,5 +276,5 @@ def about(k: int, angle: float) -> ndarray:
 
 
 KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
-    absent, of_rows, about_one_axis, swapped, scaled, axes, turns,
+    absent, concentrated, of_rows, about_one_axis, swapped, scaled, axes, turns,
 )  # fmt: skip

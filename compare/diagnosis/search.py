@@ -30,7 +30,6 @@ from .terms import all_places
 from .variants import Variant, exchanged_entries, lagrange, other_angles, other_variables, program_options
 
 FEW = 2  # states at which conventions are tried first
-SHOWN = 12  # single explanations that leave least
 NEAREST = 0.5  # of the difference: what leaves more is not near
 NEAR = 2  # conventions with which another cause is sought
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
@@ -89,14 +88,12 @@ class Explanations:
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
-        possible = [fit for fit in self.all_singles if fit.is_possible]
-        nearest = sorted(possible, key=lambda fit: fit.left_over)[:SHOWN]
-        shares = tuple((fit.places[0].name, fit.left_over, fit.explains) for fit in nearest)
-        found = found._replace(nearest=shares, causes=ranked(distinct(sorted(causes, key=self.cost))))
         if causes:
-            return found
+            return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))))
+        near = [fit for fit in self.all_singles if fit.is_possible and fit.left_over < NEAREST]
+        closest = min(near, key=lambda fit: fit.left_over, default=None)
         return found._replace(
-            closest=nearest[0].cause if nearest and nearest[0].left_over < NEAREST else None,
+            closest=closest.cause if closest else None,
             details=Compared(self.given).details() if layout.qdd is None else (),
             seconds=None if self.is_finished else self.seconds,
         )
