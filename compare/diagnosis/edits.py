@@ -247,9 +247,10 @@ def turn(tree: tmt.Tree, joint: int, fields: dict[str, ndarray], by: ndarray) ->
     """Turn all that a joint carries, where all joints are at zero."""
     carried = [k for k in range(len(tree.parent)) if joint in tree.path(k)]
     bodies = [b for b, k in enumerate(tree.body_joint) if k in carried]
-    speeds = np.concatenate([np.arange(len(tree.axis))[tree.coordinates.joints[k].qd] for k in carried])
-    for field, rows in {"axis": speeds, "offset": carried[1:], "com": bodies}.items():
-        fields[field][rows] = fields[field][rows] @ by.T
+    speeds = [v for k in carried for v in np.arange(len(tree.axis))[tree.coordinates.joints[k].qd].tolist()]
+    rows: dict[str, list[int]] = {"axis": speeds, "offset": carried[1:], "com": bodies}
+    for field, those in rows.items():
+        fields[field][those] = fields[field][those] @ by.T
     fields["inertia"][bodies] = by @ fields["inertia"][bodies] @ by.T
 
 

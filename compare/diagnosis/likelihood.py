@@ -37,8 +37,9 @@ def of_one(cause: Cause, equations: Equations) -> float:
         slides = sum(kinds.get(word) == "slide" for word in words)
         return base + OF_NAME * (1 + cause.place.count(",") + words.count("and")) + 0.15 * slides
     if cause.kind == "several":
-        numbers = [[float(x) for x in str(those).split(", ")] for those in (value, cause.stated)]
-        return base + float(np.mean([of_number(*pair, equations) for pair in zip(*numbers)]))
+        numbers, stated_numbers = (map(float, str(those).split(", ")) for those in (value, cause.stated))
+        pairs = zip(numbers, stated_numbers)
+        return base + float(np.mean([of_number(x, right, equations) for x, right in pairs]))
     if not isinstance(value, float):
         return base
     stated = cause.stated if isinstance(cause.stated, float) else 0.0

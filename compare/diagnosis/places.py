@@ -165,8 +165,11 @@ def numbers(equations: Equations) -> Iterator[Place]:
         for place in triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent):
             yield place
             if joint.kind != "slide":
-                along = [(path.at[1], x) for path, x in place.moves]
-                stays = [(Path(field, (index, k)), -x) for field, index in carried for k, x in along]
+                stays = [
+                    (Path(field, (index, path.at[1])), -x)
+                    for field, index in carried
+                    for path, x in place.moves
+                ]
                 anchor = place.name.replace("offset", "anchor", 1)
                 yield place._replace(name=anchor, moves=(*place.moves, *stays))
         if joint.kind != "ball":

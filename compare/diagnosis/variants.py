@@ -193,10 +193,11 @@ def sums_of(hinges: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The angles of hinges, and sums and differences of two or three of them."""
     angles = dict(hinges)
     for count in (2, 3) if len(hinges) <= MOST_HINGES else (2,):
-        for (first, *others), *signs in product(combinations(hinges, count), *[(1.0, -1.0)] * (count - 1)):
-            terms = list(zip(signs, others))
-            name = first + "".join(f" {'+' if sign > 0.0 else '-'} {other}" for sign, other in terms)
-            angles[name] = hinges[first] + sum(sign * hinges[other] for sign, other in terms)
+        for (first, *others), signs in product(combinations(hinges, count), product("+-", repeat=count - 1)):
+            name, angle = first, hinges[first]
+            for sign, other in zip(signs, others):
+                name, angle = f"{name} {sign} {other}", angle + float(f"{sign}1") * hinges[other]
+            angles[name] = angle
     return angles
 
 
