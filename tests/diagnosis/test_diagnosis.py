@@ -255,9 +255,12 @@ def test_two_numbers_that_differ_are_not_printed_as_one():
         assert texts[0] != texts[1] and [float(text) for text in texts] == pytest.approx(pair, rel=1e-5)
 
 
-def test_a_zero_in_degrees_that_are_taken_as_rad_is_their_number():
-    cause = Place(OF_ZERO, "zero of knee", 0.0, "rad", 1.0).cause(90.0 - np.pi / 2.0 - 28.0 * np.pi)
-    assert (cause.kind, cause.explains, cause.stated) == ("number", 90.0, pytest.approx(np.pi / 2.0))
+@pytest.mark.parametrize("change, read, meant", [
+    (90.0 - np.pi / 2.0 - 28.0 * np.pi, 90.0, np.pi / 2.0), (1.5707963 * (np.pi / 180.0 - 1.0), np.pi**2 / 360.0, np.pi / 2.0),
+])  # fmt: skip
+def test_a_zero_that_is_read_in_another_unit_is_its_angle(change, read, meant):
+    cause = Place(OF_ZERO, "zero of knee", 0.0, "rad", 1.0).cause(change)
+    assert (cause.kind, cause.explains, cause.stated) == ("number", pytest.approx(read), pytest.approx(meant))
 
 
 @pytest.mark.parametrize("unit, explains", [("rad", 0.5 - np.pi / 2), ("m", 0.5 + 1.5 * np.pi)])
