@@ -196,7 +196,7 @@ def swapped(equations: Equations) -> Iterator[Edit]:
         if parent == i >= 0
     ):
         offset, com = stated["offset"].copy(), stated["com"].copy()
-        offset[j], com[b] = com[b], offset[j]
+        offset[j], com[b] = stated["com"][b], stated["offset"][j]
         place = f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}"
         yield place, "exchanged", {"offset": offset, "com": com}
 

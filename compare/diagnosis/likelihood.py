@@ -15,7 +15,7 @@ OF_KINDS = {  # what a cause of a kind costs, besides its numbers
     "added": 0.3,    "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.5,
 }  # fmt: skip
 OF_NAME, ADDED, PAIR = 0.1, 0.1, 0.3  # for each joint that is named; a number that was 0; a second cause
-IN_PART = 0.12  # of a slip in some parts alone
+IN_PART, CONVENTION_IN_PART = 0.12, 0.2  # of a slip in some parts alone; of a convention more
 OF_WORDS = {"every": 0.03, "damping added": 0.1, "R' I R": -0.05}  # in a place
 ALONE = " alone", "but not in gravity", "but not in the velocity terms of h"
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
@@ -26,7 +26,8 @@ def cost(cause: Cause, equations: Equations) -> float:
     if len(cause.parts) > 1:
         return PAIR + sum(cost(part, equations) for part in cause.parts)
     words = sum(more for word, more in OF_WORDS.items() if word in cause.place)
-    return of_one(cause, equations) + words + IN_PART * cause.place.endswith(ALONE)
+    in_part = IN_PART + CONVENTION_IN_PART * (cause.kind in ("sign", "axes", "angles", "unit", "order"))
+    return of_one(cause, equations) + words + in_part * cause.place.endswith(ALONE)
 
 
 def of_one(cause: Cause, equations: Equations) -> float:

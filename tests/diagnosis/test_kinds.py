@@ -160,6 +160,9 @@ EDITS = {  # numbers of the arm: the cause
     "of rods": ({"inertia": np.array(ARM.inertia) * [[1], [1], [0]]}, "inertia zz of every body"),
     "in mm": ({"com": 1e3 * np.array(ARM.com), "offset": 1e3 * np.array(ARM.offset)}, "all lengths"),
     "along x": ({"gravity": (-9.81, 0.0, 0.0)}, "gravity"),
+    "a length and a CoM": (
+        {"com": ((0.0, 0.0, -0.3), ARM.com[1]), "offset": (*ARM.offset[:2], (0.0, 0.0, -0.15))},
+        "CoM of upper arm and offset of gamma"),
     "another axis": ({"axis": (*ARM.axis[:2], (0.0, 0.0, 1.0))}, "axis of gamma"),
 }  # fmt: skip
 
