@@ -9,7 +9,7 @@ import pytest
 import tmt
 from compare.engines import RECORDS
 from compare.engines.outside import Outside
-from compare.engines.outside.model import EngineError, Unasked, Unwritten
+from compare.engines.outside.file import EngineError, Unasked, Unwritten
 from compare.experiments.engines.causes import CAUSES
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult
@@ -227,14 +227,37 @@ BALL = ARM.format("", '<joint name="j" type="ball"/>', "")
 FREE = ARM.format("", '<joint name="j" type="free"/>', "")
 
 
+BESIDE = FREE.replace("</worldbody>", f'<body><joint axis="0 1 0"/>{INERTIAL.format("0 0 1")}</body></worldbody>')
+
+
 def test_a_limit_of_this_program_is_said_as_such(tmp_path):
-    """PyBullet can load a free base; a URDF has no ball joints: neither is called a refusal."""
+    """PyBullet could load two robots; a URDF has no ball joints: neither is called a refusal."""
     skip_unless_installed("pybullet")
-    for text, kind in ((FREE, Unasked), (BALL, Unwritten)):
+    for text, kind in ((BESIDE, Unasked), (BALL, Unwritten)):
         robot = compared_with("model", str(file_of(tmp_path, text))).robot
         with pytest.raises(EngineError) as error:
             Outside("pybullet").of(robot.case()).reading  # noqa: B018
         assert type(error.value) is kind
+
+
+def test_pybullet_takes_angles_of_a_quaternion_about_the_bodys_own_axes(tmp_path):
+    """Gravity on a body that is turned: its inverse dynamics has it right for the quaternion that is converted only."""
+    skip_unless_installed("pybullet")
+    import pybullet
+    from scipy.spatial.transform import Rotation
+
+    pybullet.connect(pybullet.DIRECT)
+    (tmp_path / "b.urdf").write_text(
+        '<robot name="r"><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>'
+    )
+    body = pybullet.loadURDF(str(tmp_path / "b.urdf"))
+    pybullet.setGravity(0, 0, -9.81)
+    turn = Rotation.from_euler("XYZ", [0.4, 0.5, 0.6])
+    for quaternion, is_right in ((turn, False), (Rotation.from_euler("xyz", [0.4, 0.5, 0.6]), True)):
+        state = [0.0, 0.0, 0.0, *quaternion.as_quat()], [0.0] * 6, [0.0] * 6
+        force = np.array(pybullet.calculateInverseDynamics(body, *state))[:3]  # linear first
+        assert np.allclose(force, turn.inv().apply([0.0, 0.0, 9.81])) == is_right
+    pybullet.disconnect()
 
 
 @pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))

@@ -9,7 +9,8 @@ import pytest
 import tmt
 from compare.engines import RECORDS, Setting
 from compare.engines.outside import Outside
-from compare.engines.outside.model import FROM_URDF, EngineError
+from compare.engines.outside.file import EngineError
+from compare.engines.outside.model import FROM_URDF
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.states import Sample

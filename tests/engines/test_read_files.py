@@ -131,7 +131,6 @@ def test_what_mujoco_reads_back_has_the_same_values(source, rng, states=5):
         assert (error <= FACTOR * EPS * scales.bias[state]).all()
 
 
-@pytest.mark.parametrize("name, why", [("quadruped", "root' is .* free"), ("pendulum_ball", "r' is .* ball")])
-def test_what_a_urdf_cannot_say_is_refused(name, why):
-    with pytest.raises(ValueError, match=why):
-        urdf(read(PATHS[name]).model)
+def test_what_a_urdf_cannot_say_is_refused():
+    with pytest.raises(ValueError, match="r' is of type ball"):
+        urdf(read(PATHS["pendulum_ball"]).model)

@@ -17,7 +17,10 @@ from trees import tree_of_kinds
 from compare import engines
 from compare.core.check import About, Result
 from compare.engines import EngineRecord, Method
-from compare.engines.outside.model import FROM_FILE, File, ReadModel, combined, links_of, numbers_of, size_of
+from compare.engines.outside.bodies import combined, links_of, numbers_of, size_of
+from compare.engines.outside.file import File
+from compare.engines.outside.model import FROM_FILE, ReadModel
+from compare.engines.outside.order import Order
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
 from compare.judge.entries import Entries
@@ -39,7 +42,9 @@ import numpy as np
 import tmt
 
 from . import EngineRecord
-from .outside.model import ReadModel, Unread, numbers_of
+from .outside.bodies import links_of, numbers_of
+from .outside.model import ReadModel
+from .outside.order import Order
 
 ENGINE = EngineRecord(order=90, label="{label}", reads_file=True, precision="{precision}")
 METHODS = {{"rk4": (4, "rk4"), "Euler": (1, "semi_implicit_euler"), "free": (None, "own")}}
@@ -49,25 +54,30 @@ class Model(ReadModel):
     def __init__(self, file, precision):
         from .mujoco import read
 
-        tree = read(file.path).tree
+        self.file, tree = file, read(file.path).tree
+        self.order = Order(file, {{0: (0, 0), 1: (1, 1)}})
         self.tree = dataclasses.replace(tree, {wrong})
 
-    def numbers(self):
-        return {{name: values for name, values in numbers_of(self.tree).items() if name not in ("about_origin", "{untold}")}}
+    def fields(self):
+        told = numbers_of(self.tree)
+        return {{name: told[name] for name in told if name not in ("about_origin", "{untold}")}}
 
-    def mend(self, name, values):
+    def links(self, at):
+        return links_of(self.tree, at.x)
+
+    def set_field(self, name, values):
         if name == "gravity":
             self.tree = dataclasses.replace(self.tree, gravity=values)
         return name == "gravity"
 
-    def mass_matrix(self, q):
-        return tmt.mass_matrix(q, self.tree)
+    def mass_matrix(self, at):
+        return tmt.mass_matrix(at.x, self.tree)
 
-    def bias(self, q, v):
-        return tmt.bias(q, v, self.tree)
+    def bias(self, at):
+        return tmt.bias(at.x, at.u, self.tree)
 
-    def acceleration(self, q, v, force):
-        return tmt.acceleration(q, v, force, dataclasses.replace(self.tree, damping=[0.0] * len(v)))
+    def acceleration(self, at, force):
+        return tmt.acceleration(at.x, at.u, force, dataclasses.replace(self.tree, damping=[0.0] * len(force)))
 
     def run(self, course):
         q, v, tau, times, steps, method, tolerance, _ = course
@@ -240,7 +250,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
     root, ends = report[0].parent, "__import__('os')._exit(3)"
-    mortal = AGAIN.replace("return tmt.mass_matrix(q, self.tree)", ends)
+    mortal = AGAIN.replace("return tmt.mass_matrix(at.x, self.tree)", ends)
     (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
     (root / "asked.py").write_text(ASKED)
     command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
@@ -256,12 +266,16 @@ class OfTree(ReadModel):
     def __init__(self, tree):
         self.tree, self.stated = tree, numbers_of(tree)
         self.file = File(ROOT, tree.joint_names, tree.kind)
+        joints = self.file.coordinates.places.joints
+        self.order = Order(self.file, {k: (joint.q.start, joint.qd.start) for k, joint in enumerate(joints)})
 
     def fields(self):
         return {}
 
-    def links(self, q):
-        return links_of(self.tree, q)
+    def links(self, at):
+        return links_of(self.tree, at.x)
+
+    mass_matrix = bias = acceleration = None
 
 
 @pytest.mark.parametrize("number", ("axis", "offset", "mass"))

@@ -11,7 +11,8 @@ from compare.core import timing
 from compare.core.errors import Refused
 from compare.engines import RECORDS, Motion
 from compare.engines.outside import Outside, servos_of
-from compare.engines.outside.model import FROM_FILE, numbers_of
+from compare.engines.outside.bodies import numbers_of
+from compare.engines.outside.model import FROM_FILE
 from compare.experiments.engines import batches, rows, servos
 from compare.experiments.engines.answer import cheapest_of
 from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference

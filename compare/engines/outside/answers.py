@@ -15,11 +15,12 @@ from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course
-from .model import EngineError, File, Numbers, ReadModel, Unread, numbers_of, size_of
+from .bodies import Numbers, numbers_of, size_of
+from .file import EngineError, File, Unread
+from .model import ReadModel
 
 CALLS = 50  # at most, that are timed
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
-QUANTITIES = "mass_matrix", "bias", "acceleration", "derivatives"
 T = TypeVar("T")
 
 
@@ -64,7 +65,7 @@ def read(name: str, file: File, tree: tmt.Tree, is_set: bool) -> ReadModel:
         "read": numbers, "stated": stated, "copied": model.copied, "way": model.way, "unwritten": unwritten,
         "mended": {number: is_right for number, is_right in mended.items() if number not in unwritten},
         "lacking": tuple(number for number in model.drops if stated[number].any()),
-        "has": {quantity for quantity in QUANTITIES if gives(model, quantity)},
+        "has": set(model.quantities),
         "seconds": time.perf_counter() - begin,
     }  # fmt: skip
     return model
@@ -75,21 +76,42 @@ def is_another(values: np.ndarray, stated: Numbers, number: str, eps: float) -> 
     return not np.abs(values - stated[number]).max(initial=0.0) <= eps * size_of(stated, number)
 
 
-def gives(model: ReadModel, quantity: str) -> bool:
-    """Whether the class of a model computes a quantity, for this robot too."""
-    is_defined = getattr(type(model), quantity) is not getattr(ReadModel, quantity)
-    return is_defined and quantity not in model.lacks
-
-
 def each(model: ReadModel, quantity: str, *values: Array) -> Array:
     """A quantity at many states, (states, ...)."""
-    return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
+    return np.array([QUANTITIES[quantity](model, *state) for state in zip(*values)], dtype=float)
 
 
-def seconds(model: ReadModel, quantity: str, *state: Array) -> float:
-    """Of one evaluation of a quantity at a state, the shortest."""
-    call = partial(getattr(model, quantity), *state)
-    return timing.fastest({quantity: call}, CALLS)[quantity]
+def mass_matrix(model: ReadModel, q: Array) -> Array:
+    at = model.order.state(q)
+    return at.S.T @ model.mass_matrix(at) @ at.S
+
+
+def bias(model: ReadModel, q: Array, v: Array) -> Array:
+    at = model.order.state(q, v)
+    return at.S.T @ model.bias(at)
+
+
+def acceleration(model: ReadModel, q: Array, v: Array, force: Array) -> Array:
+    at = model.order.state(q, v)
+    return np.asarray(np.linalg.solve(at.S, model.acceleration(at, at.force(force)) - at.c))
+
+
+def derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> Array:
+    """Of a robot without rotations of three angles: S is a permutation."""
+    at = model.order.state(q, v)
+    return np.array([at.S.T @ by @ at.S for by in model.derivatives(at, at.force(force))])
+
+
+QUANTITIES: dict[str, Callable[..., Array]] = {
+    "mass_matrix": mass_matrix, "bias": bias, "acceleration": acceleration, "derivatives": derivatives,
+}  # fmt: skip
+
+
+def seconds_of_derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> float:
+    """Of one call of the engine, the shortest."""
+    at = model.order.state(q, v)
+    call = partial(model.derivatives, at, at.force(force))
+    return timing.fastest({"": call}, CALLS)[""]
 
 
 def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:

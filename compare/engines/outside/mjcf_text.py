@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ...core.errors import described
-from .model import OtherJoints, OtherNames, Unread
+from .file import OtherJoints, OtherNames, Unread
 
 Model = TypeVar("Model")
 REFUSED = "Refused"  # the kind of an error that the engine raises

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -9,7 +10,10 @@ import numpy as np
 
 from ...robots.actuators import Controller
 from .. import GRID, Array, Course
-from .model import FROM_COMPILED, File, Numbers, ReadModel, Unread
+from .bodies import Body, Link, Numbers
+from .file import File, Unread
+from .model import FROM_COMPILED, ReadModel
+from .order import Order, State, rotation
 
 if TYPE_CHECKING:
     from ..mujoco.handed_on import Bare
@@ -19,6 +23,8 @@ STAGES = {"Euler": 1, "implicitfast": 1, "implicit": 1, "discrete": 1, "RK4": 4}
 
 
 class OfCompiled(ReadModel):
+    """Coordinates are MuJoCo's, of the joints of the Tree in the order of the file."""
+
     way = FROM_COMPILED
     methods: ClassVar[tuple[str, ...]] = tuple(METHODS)
     rotors_in_joints: ClassVar[bool] = False  # the armature of actuators is that of their joints
@@ -31,6 +37,16 @@ class OfCompiled(ReadModel):
         self.driven = cache(self.made_driven)
         self.bare = self.made_bare(None)
         self.models = self.made_models(self.bare)
+        starts = {}
+        for k, (name, place) in enumerate(self.bare.places.items()):
+            of_slides = 3 * file.is_free(k)
+            if name.rsplit(" ", 1)[0] not in file.free or of_slides:
+                starts[k] = place.qpos.start - of_slides, place.dofs.start - of_slides
+        self.order = Order(file, starts)
+        joints = self.bare.model.dof_jntid[self.bare.dofs]
+        # of `fields`: MuJoCo's names, and the indices of the Tree's speeds
+        self.where = {"armature": ("dof_armature", self.bare.dofs), "damping": ("dof_damping", self.bare.dofs),
+                      "stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}  # fmt: skip
 
     def made_bare(self, controller: Controller | None) -> Bare:
         """The model that the engine takes, whose actuators act if there is a controller."""
@@ -47,9 +63,17 @@ class OfCompiled(ReadModel):
         except NotImplementedError as error:
             raise Unread(f"it does not have what it needs: {error}") from None
 
+    @abstractmethod
     def put_model(self, model: Any) -> Any:
         """The engine's model of one of MuJoCo's."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def held(self, name: str) -> Array:
+        """A field of the engine's models by MuJoCo's name of it."""
+
+    @abstractmethod
+    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
+        """One of the engine's models in which a field, by MuJoCo's name of it, has these values at indices."""
 
     def made_driven(self, key: tuple[float | None, ...]) -> tuple[Bare, dict[str, Any]]:
         """Models in which the actuators act with these controls, with all that is set in the others."""
@@ -71,31 +95,50 @@ class OfCompiled(ReadModel):
         bare, models = self.driven(controller.controls)
         return bare, models[course.method], course.tau - controller.torque
 
-    def held(self, name: str) -> Array:
-        """A field of the engine's models by MuJoCo's name of it."""
-        raise NotImplementedError
+    def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
+        """q, and speeds or forces, (..., n), in MuJoCo's order of joints."""
+        placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
+        placed[0][..., self.bare.qpos] = q
+        for vector, values in zip(placed[1:], of_speeds):
+            vector[..., self.bare.dofs] = values
+        return placed
 
-    def gravity(self) -> Array:
-        raise NotImplementedError
+    def fields(self) -> Numbers:
+        return {name: self.held(field)[index] for name, (field, index) in self.where.items()}
 
-    def numbers(self) -> Numbers:
-        return {"gravity": self.gravity(), **self.bare.numbers(self.held)}
+    def set_field(self, name: str, values: Array) -> bool:
+        field, index = self.where[name]
+        self.fields_set[field] = index, values
+        for method, model in self.models.items():
+            self.models[method] = self.with_field(model, field, index, values)
+        return True
 
-    def mend(self, name: str, values: Array) -> bool:
-        dofs, joints = self.bare.dofs, self.bare.model.dof_jntid[self.bare.dofs]
-        places = {"armature": ("dof_armature", dofs), "damping": ("dof_damping", dofs)}
-        places |= {"stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}
-        if name in places:
-            field, index = places[name]
-            self.fields_set[field] = index, values
-            self.models = {
-                kind: self.with_field(model, field, index, values) for kind, model in self.models.items()
-            }
-        return name in places
+    def links(self, at: State) -> list[Link]:
+        """Bodies at the place that they have on their parents where all joints are 0: enough for masses and moments."""
+        names = "pos", "quat", "mass", "ipos", "iquat", "inertia"
+        position, turn, mass, com, axes, moments = (self.held(f"body_{name}") for name in names)
+        parents, bodies = self.held("body_parentid"), self.held("jnt_bodyid")
+        joints = {int(bodies[place.joint]): k for k, place in enumerate(self.bare.places.values())}
+        links = [Link(0, None, None, np.eye(3), np.zeros(3), Body(0.0, np.zeros(3), np.zeros((3, 3))))]
+        for body in range(1, len(mass)):
+            parent, R = links[parents[body]], rotation(axes[body]).as_matrix()
+            own = Body(float(mass[body]), com[body], R @ np.diag(moments[body]) @ R.T)
+            there = (
+                parent.turn @ rotation(turn[body]).as_matrix(),
+                parent.origin + parent.turn @ position[body],
+            )
+            links.append(Link(body, int(parents[body]), joints.get(body), *there, own))
+        return links[1:]
 
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        """One of the engine's models in which a field, by MuJoCo's name of it, has these values at indices."""
-        raise NotImplementedError
+    @abstractmethod
+    def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
+        """qpos and qvel at the times of a course after the first, (times, n). start: qpos, qvel, applied force."""
+
+    def run(self, course: Course) -> tuple[Array, int]:
+        bare, model, tau = self.of_course(course)
+        qpos, qvel = self.path(bare, model, self.placed(course.q, course.v, tau), course)
+        states = np.hstack([qpos[:, bare.qpos], qvel[:, bare.dofs]])
+        return np.vstack([course.start, states]), course.steps * STAGES[course.method]
 
     def prepare(self, course: Course) -> None:
         """Compile, by a run without steps."""

@@ -1,84 +1,189 @@
-"""Coordinates of an engine that are those of the Tree in another order, with a free body's speeds in part in other axes."""
+"""Coordinates of an engine beside those of the Tree: where joints begin, how rotations are stated, the axes of speeds.
 
-from collections.abc import Mapping, Sequence
+Of the Tree: quaternions w x y z; of a free joint the velocity of the body's origin in the world and the angular velocity in body
+axes. With S and c of a state, the engine's speeds are S v, its accelerations S a + c.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from .. import Array
-from .model import File
+from .file import File
 
-Places = Sequence[int]
 Starts = Mapping[int, tuple[int, int]]
 
 
-class Order(NamedTuple):
-    q: Array  # the place in the Tree's q of each of the engine's numbers
-    v: Array  # (nv,) the same in v
-    # of each free body, and of balls where that is so: speeds of the engine, the quaternion in the Tree's q
-    turned: tuple[tuple[slice, slice], ...]
-    # those speeds are in world axes where the Tree's are in body axes; False: the other way round
-    in_world: bool
-    nq: int  # of the Tree
+class Code(NamedTuple):
+    """How an engine states the position of a joint."""
 
-    def engine(self, q: Array, *vectors: Array) -> list[Array]:
-        """q, and vectors of speeds or forces at q, of the Tree as the engine has them."""
-        placed = [vector[self.v] for vector in vectors]
-        for at, place in self.turned:
-            turn = self.turn(q[place])
-            for vector in placed:
-                vector[at] = turn @ vector[at]
-        return [q[self.q], *placed]
-
-    def tree(self, q: Array, vector: Array) -> Array:
-        """A vector of the engine, (nv,), or vectors as columns, at q of the Tree, as the Tree has it."""
-        placed = np.empty_like(vector)
-        placed[self.v] = vector
-        for at, place in self.turned:
-            placed[self.v[at]] = self.turn(q[place]).T @ vector[at]
-        return placed
-
-    def turn(self, quaternion: Array) -> Array:
-        """The rotation (3, 3) from the Tree's axes to the engine's."""
-        turn = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
-        return turn if self.in_world else turn.T
-
-    def positions(self, q: Array) -> Array:
-        """Positions of the engine in the Tree's order, quaternions of length 1."""
-        placed = np.ones(self.nq)
-        placed[self.q] = q
-        for _, place in self.turned:
-            placed[place] /= np.linalg.norm(placed[place])
-        return placed
-
-    def tree_matrix(self, q: Array, matrix: Array) -> Array:
-        return self.tree(q, self.tree(q, matrix).T)
+    size: int  # numbers of the engine
+    encode: Callable[[Array], Array]  # from the Tree's numbers
+    decode: Callable[[Array], Array]
 
 
-def order_of(
-    file: File, starts: Starts, free_q: Places, free_v: Places, in_world: bool, ball_q: Places = (0, 1, 2, 3),
-    turned_balls: bool = False, turned_at: int = 0,
-) -> Order:  # fmt: skip
-    """The order of an engine.
+def quaternion(turn: Rotation) -> Array:
+    return np.roll(turn.as_quat(), 1)
 
-    starts: where the engine's q and v of a joint begin, by its number in the Tree, of a free joint by that of its ball; free_q,
-    free_v, ball_q: of a free joint and of a ball, the Tree's numbers in the engine's order; turned_balls: a ball's speeds are
-    in the axes of the body that carries it; turned_at: the first of a free joint's speeds that are in other axes.
+
+def rotation(wxyz: Array) -> Rotation:
+    return Rotation.from_quat(np.roll(wxyz, -1))
+
+
+def unit(wxyz: Array) -> Array:
+    return wxyz / np.linalg.norm(wxyz)
+
+
+NUMBER = Code(1, np.array, np.array)
+CIRCLE = Code(2, lambda q: np.r_[np.cos(q), np.sin(q)], lambda x: np.arctan2(x[1:], x[:1]))
+WXYZ = Code(4, np.array, unit)
+XYZW = Code(4, lambda q: np.roll(q, -1), lambda x: unit(np.roll(x, 1)))
+VECTOR = Code(3, lambda q: rotation(q).as_rotvec(), lambda x: quaternion(Rotation.from_rotvec(x)))
+ANGLES = Code(3, lambda q: rotation(q).as_euler("xyz"), lambda x: quaternion(Rotation.from_euler("xyz", x)))
+
+
+class Convention(NamedTuple):
+    """How an engine has free joints and balls; by default as the Tree."""
+
+    free: Code = WXYZ  # the rotation of a free joint
+    ball: Code = WXYZ
+    rotation_first: bool = False  # in the positions of a free joint
+    angular_first: bool = False  # in its speeds
+    linear_in_world: bool = True
+    angular_in_world: bool = False
+    balls_in_parent: bool = False  # a ball's angular velocity is in the axes of the body that carries it
+
+
+AS_THE_TREE = Convention()
+
+
+class State(NamedTuple):
+    """A state of the Tree in an engine's coordinates."""
+
+    x: Array  # positions of the engine
+    u: Array  # its speeds
+    S: Array  # (nv, nv)
+    c: Array  # (nv,)
+
+    def force(self, force: Array) -> Array:
+        """Generalized forces of the Tree as the engine has them."""
+        return np.asarray(np.linalg.solve(self.S.T, force))
+
+
+@dataclass(frozen=True)
+class Order:
+    """The coordinates of an engine.
+
+    starts: where its q and v of a joint begin, by the number of the joint in the Tree; of a free joint by that of its ball.
     """
-    q: dict[int, int] = {}
-    v: dict[int, int] = {}
-    turned = []
-    for k, (start_q, start_v) in starts.items():
-        joint = file.coordinates.places.joints[k]
-        of_q, of_v = np.r_[joint.q], np.r_[joint.qd]
-        if file.is_free(k):
-            turned.append((slice(start_v + turned_at, start_v + turned_at + 3), joint.q))
-            of_q, of_v = of_q[0] - 3 + np.array(free_q), of_v[0] - 3 + np.array(free_v)
-        elif joint.kind == "ball":
-            of_q = of_q[list(ball_q)]
-            turned += [(slice(start_v, start_v + 3), joint.q)] * turned_balls
-        q |= enumerate(of_q, start_q)
-        v |= enumerate(of_v, start_v)
-    in_q, in_v = (np.array([place for _, place in sorted(places.items())], int) for places in (q, v))
-    return Order(in_q, in_v, tuple(turned), in_world, file.coordinates.nq)
+
+    file: File
+    starts: Starts
+    convention: Convention = AS_THE_TREE
+    circles: tuple[int, ...] = ()  # joints whose angle is stated by its cosine and sine
+    # (nq,): the Tree's positions where those of hinges and slides are 0 in the engine
+    reference: Array | float = 0.0
+    # of free joints, by the number of the ball: the point of the body whose velocity the engine has
+    points: Mapping[int, Array] = field(default_factory=dict)
+
+    @cached_property
+    def parts(self) -> list[tuple[slice, slice, Code]]:
+        """The numbers of positions in the Tree, those in the engine, and how these are stated."""
+        parts, about = [], self.convention
+        joints = self.file.coordinates.places.joints
+        for k, (start, _) in self.starts.items():
+            place, code = joints[k].q, CIRCLE if k in self.circles else NUMBER
+            if self.file.is_free(k):
+                code = about.free
+                linear = start + code.size * about.rotation_first
+                first = place.start - 3
+                parts += [
+                    (slice(first + i, first + i + 1), slice(linear + i, linear + i + 1), NUMBER)
+                    for i in range(3)
+                ]
+                start += 3 * (not about.rotation_first)
+            elif joints[k].kind == "ball":
+                code = about.ball
+            parts.append((place, slice(start, start + code.size), code))
+        return parts
+
+    @cached_property
+    def v(self) -> Array:
+        """The place in the Tree's v of each of the engine's speeds, (nv,)."""
+        places = np.empty(self.file.coordinates.nv, int)
+        for k, (_, start) in self.starts.items():
+            for first, speeds in zip(self.blocks(k, start), self.speeds(k)):
+                places[first : first + len(speeds)] = speeds
+        return places
+
+    def speeds(self, joint: int) -> list[range]:
+        """The Tree's speeds of a joint; of a free one linear and angular."""
+        speeds = self.file.coordinates.places.joints[joint].speeds
+        return [range(speeds.start - 3, speeds.start), speeds] if self.file.is_free(joint) else [speeds]
+
+    def blocks(self, joint: int, start: int) -> list[int]:
+        """Where they begin in the engine's."""
+        if not self.file.is_free(joint):
+            return [start]
+        return [start + 3, start] if self.convention.angular_first else [start, start + 3]
+
+    @property
+    def has_rotations(self) -> bool:
+        return bool(self.file.coordinates.has_balls)
+
+    def engine_positions(self, q: Array) -> Array:
+        x, moved = np.empty(max(part.stop for _, part, _ in self.parts)), q - self.reference
+        for place, part, code in self.parts:
+            x[part] = code.encode(moved[place])
+        return x
+
+    def tree_positions(self, x: Array) -> Array:
+        q = np.empty(self.file.coordinates.nq)
+        for place, part, code in self.parts:
+            q[place] = code.decode(x[part])
+        return q + self.reference
+
+    def tree_numbers(self, values: Array) -> Array:
+        """Numbers of the engine's speeds, (nv,) or (nv, nv), in the Tree's order; axes are left as they are."""
+        placed = np.empty_like(values)
+        placed[np.ix_(*[self.v] * values.ndim)] = values
+        return placed
+
+    def tree_speeds(self, q: Array, u: Array) -> Array:
+        S, _ = self.speeds_at(q)
+        return np.asarray(np.linalg.solve(S, u))
+
+    def state(self, q: Array, v: Array | None = None) -> State:
+        """A state; at rest by default."""
+        v = np.zeros(self.file.coordinates.nv) if v is None else v
+        S, c = self.speeds_at(q, v)
+        return State(self.engine_positions(q), S @ v, S, c)
+
+    def speeds_at(self, q: Array, v: Array | None = None) -> tuple[Array, Array]:
+        """S and c at a state."""
+        S, c, about = np.zeros((len(self.v),) * 2), np.zeros(len(self.v)), self.convention
+        S[np.arange(len(self.v)), self.v] = 1.0
+        for k, (_, start) in self.starts.items():
+            joint = self.file.coordinates.places.joints[k]
+            if joint.kind != "ball":
+                continue
+            R = rotation(q[joint.q]).as_matrix()
+            *linear, rows = (slice(first, first + 3) for first in self.blocks(k, start))
+            if not linear:
+                S[rows, joint.qd] = R if about.balls_in_parent else np.eye(3)
+                continue
+            in_linear = np.eye(3) if about.linear_in_world else R.T
+            S[rows, joint.qd] = R if about.angular_in_world else np.eye(3)
+            of_origin, point = slice(joint.qd.start - 3, joint.qd.start), R @ self.points.get(k, np.zeros(3))
+            S[linear[0], of_origin] = in_linear
+            S[linear[0], joint.qd] = in_linear @ np.cross(R, point[:, None], axis=0)
+            if v is not None:
+                w = R @ v[joint.qd]
+                c[linear[0]] = in_linear @ np.cross(w, np.cross(w, point))
+                if not about.linear_in_world:  # the axes turn
+                    c[linear[0]] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
+        return S, c

@@ -13,16 +13,8 @@ from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
-from ...engines.outside.model import (
-    FROM_URDF,
-    EngineError,
-    OtherJoints,
-    OtherNames,
-    TooLong,
-    Unasked,
-    Unread,
-    Unwritten,
-)
+from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unasked, Unread, Unwritten
+from ...engines.outside.model import FROM_URDF
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR

@@ -12,7 +12,7 @@ from ...core import timing
 from ...engines import LABELS, RECORDS, Array, Engine
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.outside import OutsideDynamics
-from ...engines.outside.model import EngineError
+from ...engines.outside.file import EngineError
 from ...robots.case import Case
 from ..setup import Setup
 from .motion import free_scene

@@ -7,7 +7,9 @@ import numpy as np
 from ...core.check import About
 from ...core.words import some_of
 from ...engines import EngineRecord
-from ...engines.outside.model import OtherNames, Reading, size_of
+from ...engines.outside.bodies import size_of
+from ...engines.outside.file import OtherNames
+from ...engines.outside.model import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from .causes import Cause, Entry, Text, cause_of

@@ -9,7 +9,7 @@ import tmt
 
 from ...engines import GRID, LABELS, RECORDS, Array, Dynamics, Engine, Method, Setting
 from ...engines.outside import Outside
-from ...engines.outside.model import EngineError
+from ...engines.outside.file import EngineError
 from ...judge.run import diverged_at
 from ...judge.scale import FACTOR
 from ...robots.case import Case
