@@ -227,7 +227,9 @@ BALL = ARM.format("", '<joint name="j" type="ball"/>', "")
 FREE = ARM.format("", '<joint name="j" type="free"/>', "")
 
 
-BESIDE = FREE.replace("</worldbody>", f'<body><joint axis="0 1 0"/>{INERTIAL.format("0 0 1")}</body></worldbody>')
+BESIDE = FREE.replace(
+    "</worldbody>", f'<body><joint axis="0 1 0"/>{INERTIAL.format("0 0 1")}</body></worldbody>'
+)
 
 
 def test_a_limit_of_this_program_is_said_as_such(tmp_path):

@@ -35,8 +35,10 @@ FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
 <inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/></body></worldbody></mujoco>"""
 FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
 STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
-MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>
-<geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom type="mesh" mesh="m"/><body pos="0 0 1">
+MESHES = """<mujoco><compiler meshdir="parts"/>
+<default><default class="drawn"><geom type="mesh" mesh="m"/></default></default>
+<asset><mesh name="m" file="m.stl"/></asset><worldbody>
+<geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom class="drawn"/><geom size="0.1" mass="0"/><body pos="0 0 1">
 <joint axis="1 0 0"/><inertial pos="0 0 0.5" mass="2" diaginertia="0.3 0.2 0.15"/><geom type="mesh" mesh="m"/>
 </body></body></worldbody></mujoco>"""
 ARM = Path(__file__).parents[2] / "mjcf" / "arm.xml"
@@ -66,7 +68,7 @@ def robot_of(path, text, floating=False):
     ("crane.urdf", URDF), ("floating.urdf", URDF), ("robot.xml", WHOLE), ("meshes.xml", MESHES),
 ))  # fmt: skip
 def test_a_urdf_and_files_with_an_include_and_with_meshes(engine, name, text, tmp_path):
-    """A body whose mass is a mesh's has the inertia that MuJoCo has computed."""
+    """A body whose mass is a mesh's, by its class, has the inertia that MuJoCo has computed."""
     (tmp_path / "part.xml").write_text(PART)
     (tmp_path / "parts").mkdir()
     (tmp_path / "parts" / "m.stl").write_bytes(struct.pack("<80sI", b"", 4) + b"".join(STL))

@@ -1,6 +1,6 @@
 """MJCF with all of its includes in one text, for engines that cannot read them or need names."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Generic, NamedTuple, TypeVar
@@ -55,7 +55,7 @@ def whole_text(path: Path) -> str:
     root.attrib.setdefault("model", "robot")
     bodies = [body for world in root.findall("worldbody") for body in world.iter("body")]
     if root.find(".//mesh") is not None:
-        state_inertias(bodies, path)
+        take_meshes_away(bodies, path)
     for parent in list(root.iter()):
         for child in [child for child in parent if child.tag in FROM_FILES or is_from_file(child)]:
             parent.remove(child)
@@ -71,19 +71,37 @@ def is_from_file(part: ElementTree.Element) -> bool:
     return part.tag == "geom" and any(name in part.attrib for name in FROM_FILES)
 
 
-def state_inertias(bodies: list[ElementTree.Element], path: Path) -> None:
-    """Add the inertia that MuJoCo has computed to bodies with meshes and without one. It has vertices in float32."""
+def take_meshes_away(bodies: list[ElementTree.Element], path: Path) -> None:
+    """Remove geoms that are meshes, by their class too; their bodies get the inertia that MuJoCo has computed, in float32."""
+    import mujoco
+
     from ..mujoco.source import Source
 
-    model = Source(path).model
-    if model.nbody != len(bodies) + 1:
+    source = Source(path)
+    model, compiled = source.model, list(source.spec.bodies)[1:] if source.spec else []  # without the world
+    if not model.nbody - 1 == len(compiled) == len(bodies):
         raise Unread("its bodies are not all in the text")
-    for number, body in enumerate(bodies, start=1):
-        if any(map(is_from_file, body)) and body.find("inertial") is None:
+    for number, (body, of_spec) in enumerate(zip(bodies, compiled), start=1):
+        geoms = list(geoms_in(body))
+        if len(geoms) != len(of_spec.geoms):
+            raise Unread("its geoms are not all in the text")
+        meshes = [pair for pair, geom in zip(geoms, of_spec.geoms) if geom.type == mujoco.mjtGeom.mjGEOM_MESH]
+        for parent, geom in meshes:
+            parent.remove(geom)
+        if meshes and body.find("inertial") is None:
             inertial = ElementTree.SubElement(body, "inertial")
             for name, field in FIELDS.items():
                 values = np.ravel(getattr(model, f"body_{field}")[number]).tolist()
                 inertial.set(name, " ".join(map(repr, values)))
+
+
+def geoms_in(part: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, ElementTree.Element]]:
+    """The geoms of a body with the elements around them: itself, or its frames."""
+    for child in part:
+        if child.tag == "geom":
+            yield part, child
+        elif child.tag == "frame":
+            yield from geoms_in(child)
 
 
 def included(element: ElementTree.Element, folder: Path) -> ElementTree.Element:
