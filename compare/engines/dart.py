@@ -12,12 +12,10 @@ import numpy as np
 from tmt import Tree
 
 from . import Array, EngineRecord
-from .outside.bodies import Body, Link
 from .outside.of_urdf import OfUrdf
-from .outside.order import VECTOR, Convention, Order, State
+from .outside.order import VECTOR, Order, State, of_free
 
 ENGINE = EngineRecord(order=75, label="DART", colour="#882255", marker="*", package="dartpy", reads_file=True)
-CONVENTION = Convention(free=VECTOR, rotation_first=True, angular_first=True, angular_in_world=True)
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
 
 
@@ -46,7 +44,10 @@ class Model(OfUrdf):
             if joint is not None:  # else it is a part of a free joint
                 self.joints[k] = joint
         places = {k: joint.getIndexInSkeleton(0) for k, joint in self.joints.items()}  # in q and in v
-        self.order = Order(self.file, {k: (place, place) for k, place in places.items()}, CONVENTION)
+        starts = {k: (place, place) for k, place in places.items()}
+        for k in filter(self.file.is_free, places):
+            starts |= of_free(k, (places[k] + 3,) * 2, starts[k])
+        self.order = Order(self.file, starts, free=VECTOR, angular_in_world=True)
         self.dampers = {places[k]: joint for k, joint in self.joints.items() if not self.file.is_free(k)}
 
     def damping(self) -> Array:
@@ -54,17 +55,6 @@ class Model(OfUrdf):
         for place, joint in self.dampers.items():
             damping[self.order.v[place]] = joint.getDampingCoefficient(0)
         return damping
-
-    def links(self, at: State) -> list[Link]:
-        numbers = {joint.getName(): k for k, joint in self.joints.items()}
-        links = []
-        for node in self.skeleton.getBodyNodes():
-            place, inertia, parent = node.getWorldTransform(), node.getInertia(), node.getParentBodyNode()
-            body = Body(inertia.getMass(), node.getLocalCOM(), inertia.getMoment())
-            joint = numbers.get(node.getParentJoint().getName())
-            names = node.getName(), parent and parent.getName()
-            links.append(Link(*names, joint, place.rotation(), place.translation(), body))
-        return links
 
     def gravity(self) -> Array:
         return np.array(self.world.getGravity())

@@ -63,11 +63,6 @@ class Model(OfCompiled):
     def held(self, name: str) -> Array:
         return np.array(attrgetter(name)(self.models["Euler"]))
 
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        field = np.array(attrgetter(name)(model))
-        field[index] = values
-        return model.tree_replace({name: field})
-
     def values(self, at: State, force: Array | None = None) -> tuple[Array, ...]:
         """M, h and the acceleration."""
         force = np.zeros_like(at.u) if force is None else force
@@ -103,7 +98,7 @@ class Model(OfCompiled):
     @property
     def quantities(self) -> tuple[str, ...]:
         """Quaternions do not move like numbers."""
-        return super().quantities + ("derivatives",) * (not self.order.has_rotations)
+        return super().quantities + ("derivatives",) * (not self.file.coordinates.has_balls)
 
     def derivatives(self, at: State, force: Array) -> Array:
         state = (values.astype(self.precision) for values in (at.x, at.u, force))

@@ -17,7 +17,7 @@ from . import Array, Course, EngineRecord
 from .outside.bodies import Body, Link, Numbers
 from .outside.file import EngineError, File, OtherJoints
 from .outside.model import SteppedModel
-from .outside.order import XYZW, Convention, Order, State
+from .outside.order import XYZW, Order, State
 from .warp import METHODS as OF_WARP
 from .warp import methods_for as methods_of_warp
 
@@ -28,7 +28,7 @@ USED = "implicitfast", "RK4"  # integrators of SolverMuJoCo; the others are thos
 UNCONSTRAINED = 0b11111  # MuJoCo's flags that disable all constraints
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
 PASSIVE = "damping", "stiffness"
-CONVENTION = Convention(free=XYZW, ball=XYZW, angular_in_world=True, balls_in_parent=True)
+AXES = {"angular_in_world": True, "balls_in_parent": True}
 
 
 def by_mujoco(methods: dict[str, tuple[int, str]]) -> dict[str, tuple[int, str]]:
@@ -44,7 +44,7 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 
 
 class Model(SteppedModel):
-    has_places = True
+    has_links = True
     share = 1e-6
 
     def __init__(self, file: File, precision: str):
@@ -58,6 +58,7 @@ class Model(SteppedModel):
         else:
             builder.add_mjcf(str(file.path), skip_equality_constraints=True)
         self.newton, self.file, self.model = newton, file, builder.finalize(device="cpu")
+        self.read: dict[str, Array] = {}
         self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.solver = cache(self.made_solver)
         for name in OFF:
@@ -65,10 +66,12 @@ class Model(SteppedModel):
         self.firsts, self.children = self.model.joint_qd_start.numpy(), self.model.joint_child.numpy()
         self.order = self.made_order()
         self.joint_at = {start: k for k, (_, start) in self.order.starts.items()}
-        self.read = {name: self.held(name) for name in ("armature", *PASSIVE)}
+        for name in ("armature", *PASSIVE):
+            values = getattr(self.model, f"joint_{name}").numpy().astype(float)
+            self.read[name] = self.order.tree_numbers(values)
 
     def made_order(self) -> Order:
-        from .mujoco.names import joint_places
+        from .mujoco.names import joint_places, kind_of
         from .mujoco.source import Source
 
         file, compiled = self.file, Source(self.file.path, self.file.floating).model
@@ -83,21 +86,13 @@ class Model(SteppedModel):
         coms, bodies = self.model.body_com.numpy(), dict(zip(self.firsts.tolist(), self.children))
         for name in sorted(places, key=slides_first):
             k, place = file.names.index(name), places[name]
-            slides = 3 * file.is_free(k)  # which are part of a free joint
-            starts[k] = nq - slides, nv - slides
-            if slides:
+            starts[k] = nq, nv
+            if file.is_free(k):
                 points[k] = coms[bodies[nv - 3]]
-            elif place.kind != "ball":
+            elif kind_of(compiled, place.joint) in ("hinge", "slide"):
                 reference[joints[k].q] = compiled.qpos0[place.qpos.start]
             nq, nv = nq + len(place.qpos), nv + len(place.dofs)
-        in_free = {f"{name} {axis}" for name in file.free for axis in "xyz"}
-        for k in [k for k in starts if file.names[k] in in_free]:
-            reference[joints[k].q] = 0.0
-            del starts[k]
-        return Order(file, starts, CONVENTION, reference=reference, points=points)
-
-    def held(self, name: str) -> Array:
-        return self.order.tree_numbers(getattr(self.model, f"joint_{name}").numpy().astype(float))
+        return Order(file, starts, XYZW, XYZW, **AXES, reference=reference, points=points)
 
     def made_solver(self, method: str) -> Any:
         if method == FEATHERSTONE:
@@ -176,14 +171,11 @@ class Model(SteppedModel):
         for name in PASSIVE:
             values = self.read[name][self.order.v] * (method is not None)
             getattr(self.model, f"joint_{name}").assign(values)
-        if method == FEATHERSTONE:
-            for k, joint in enumerate(self.file.coordinates.places.joints):
-                is_damped = (
-                    self.file.is_free(k) and self.read["damping"][np.ravel(self.order.speeds(k))].any()
-                )
-                if is_damped or (joint.kind == "ball" and self.read["stiffness"][joint.qd].any()):
-                    missing = "no springs of ball joints and no damping of free joints"
-                    raise EngineError(f"the Featherstone solver has {missing}")
+        is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
+        is_damped = self.read["damping"][self.order.is_of_free()].any()
+        if method == FEATHERSTONE and (is_damped or self.read["stiffness"][is_of_ball].any()):
+            missing = "no springs of ball joints and no damping of free joints"
+            raise EngineError(f"the Featherstone solver has {missing}")
         self.solver(method or FEATHERSTONE)
 
     def start(self, at: State, dt: float, method: str | None) -> None:

@@ -12,18 +12,17 @@ from .outside.bodies import Body, Link, Numbers
 from .outside.file import File, OtherJoints, OtherNames
 from .outside.mjcf_text import original_or_copy
 from .outside.model import ReadModel
-from .outside.order import XYZW, Convention, Order, State
+from .outside.order import XYZW, Order, State, of_free
 
 ENGINE = EngineRecord(
     order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", reads_file=True
 )
 METHODS: dict[str, tuple[int, str]] = {}  # it has no integrators
-CONVENTION = Convention(free=XYZW, ball=XYZW, linear_in_world=False)
 FREE = "JointModelFreeFlyer"
 
 
 class Model(ReadModel):
-    has_places = True
+    has_links = True
     drops = ("damping", "stiffness")  # aba applies no damping, and its model has no springs
 
     def __init__(self, file: File, precision: str):
@@ -49,12 +48,13 @@ class Model(ReadModel):
             k = self.number_of(f"{next(free, name)} turn" if joint.shortname() == FREE else name)
             q, v = joint.idx_q, joint.idx_v
             for part in parts:
-                starts[k], self.last[number] = (q, v), k
+                is_free, self.last[number] = part.nv == 6, k
+                starts |= of_free(k, (q, v), (q + 3, v + 3)) if is_free else {k: (q, v)}
                 circles += [k] * (part.nq == 2)
                 q, v, k = q + part.nq, v + part.nv, k + 1
         if self.model.nv != self.file.coordinates.nv:
             raise OtherJoints(f"it has {self.model.nv} speeds, the file {self.file.coordinates.nv}")
-        self.order = Order(self.file, starts, CONVENTION, tuple(circles))
+        self.order = Order(self.file, starts, XYZW, XYZW, linear_in_world=False, circles=tuple(circles))
 
     def number_of(self, name: str) -> int:
         if name not in self.file.names:

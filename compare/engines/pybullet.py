@@ -16,16 +16,14 @@ from scipy.spatial.transform import Rotation
 from tmt import Tree
 
 from . import Array, EngineRecord
-from .outside.bodies import Body, Link
 from .outside.file import Unasked
 from .outside.of_urdf import OfUrdf
-from .outside.order import XYZW, Convention, Order, State
+from .outside.order import XYZW, Order, State, of_free
 
 ENGINE = EngineRecord(
     order=80, label="PyBullet", colour="#661100", marker="d", package="pybullet", reads_file=True
 )
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
-CONVENTION = Convention(free=XYZW, angular_in_world=True, angular_first=True)
 BASE = -1  # the number of the root link
 
 
@@ -63,9 +61,10 @@ class Model(OfUrdf):
         if not is_fixed:
             ball = self.file.names.index(f"{self.file.free[0]} turn")
             *_, centre, axes = self.bullet.getDynamicsInfo(self.robot, BASE)[:5]
-            self.joints[BASE], starts[ball] = ball, (0, 0)
+            self.joints[BASE] = ball
+            starts |= of_free(ball, (0, 3), (3, 0))
             self.points, self.axes = {ball: np.array(centre)}, Rotation.from_quat(axes)
-        self.order = Order(self.file, starts, CONVENTION, points=self.points)
+        self.order = Order(self.file, starts, free=XYZW, angular_in_world=True, points=self.points)
         for link in (BASE, *numbers):
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
@@ -78,21 +77,6 @@ class Model(OfUrdf):
     def damping(self) -> Array:
         of_joints = [self.infos[link][6] for link in self.links_moved]
         return self.order.tree_numbers(np.r_[np.zeros(6 * len(self.points)), of_joints])
-
-    def links(self, at: State) -> list[Link]:
-        place = self.bullet.getBasePositionAndOrientation(self.robot)
-        parents, places = [None, *(info[16] for info in self.infos)], [place]
-        numbers = range(len(self.infos))
-        places += [
-            self.bullet.getLinkState(self.robot, link, computeForwardKinematics=True)[:2] for link in numbers
-        ]
-        links = []
-        for link, (parent, (centre, turn)) in enumerate(zip(parents, places), start=BASE):
-            mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, link)
-            body = Body(mass, np.zeros(3), np.diag(moments))  # axes and origin are those of the inertia
-            R = Rotation.from_quat(turn).as_matrix()
-            links.append(Link(link, parent, self.joints.get(link), R, np.array(centre), body))
-        return links
 
     def gravity(self) -> Array:
         engine = self.bullet.getPhysicsEngineParameters()

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp",
                       reads_file=True, compiles=True, precision="float32")  # fmt: skip
-STRUCTURE = "body_parentid", "jnt_bodyid"
 METHODS = OF_MJX | {"implicit": (1, "implicit"), "discrete": (1, "semi_implicit_euler")}
 
 
@@ -62,16 +61,8 @@ class Model(OfCompiled):
         return self.engine.put_model(model)
 
     def held(self, name: str) -> Array:
-        """All worlds share the first row of a field of numbers; those of the structure have no worlds."""
         values: Array = attrgetter(name)(self.models["Euler"]).numpy()
-        return values if name in STRUCTURE else values[0]
-
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        field = attrgetter(name)(model)
-        numbers = field.numpy()
-        numbers[0, index] = values
-        field.assign(numbers)
-        return model
+        return values[0]  # all worlds share it
 
     @cached_property
     def model(self) -> Any:
@@ -143,7 +134,7 @@ class Model(OfCompiled):
         with self.warp.ScopedDevice(device):
             model = self.models[course.method]
             if not device.is_cpu:
-                model = self.with_all_fields(self.made_models(self.bare))[course.method]
+                model = self.made_models(self.bare)[course.method]
             advance, data = self.begun(self.bare, model, start, course)
 
         def run() -> Array:

@@ -260,22 +260,3 @@ def test_pybullet_takes_angles_of_a_quaternion_about_the_bodys_own_axes(tmp_path
         force = np.array(pybullet.calculateInverseDynamics(body, *state))[:3]  # linear first
         assert np.allclose(force, turn.inv().apply([0.0, 0.0, 9.81])) == is_right
     pybullet.disconnect()
-
-
-@pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
-def test_a_ball_joint(engine, tmp_path):
-    """Mass matrix, bias and accelerations in body axes, at a posture that is turned."""
-    skip_unless_installed(engine)
-    robot = compared_with("model", str(file_of(tmp_path, BALL))).robot
-    of, rng = Outside(engine).of(robot.case()), np.random.default_rng(2)
-    q, (v, tau) = robot.coordinates.random(rng, 3), rng.uniform(-1.0, 1.0, (2, 3, 3))
-    model = mujoco.MjModel.from_xml_string(BALL)
-    data, M = mujoco.MjData(model), np.zeros((3, 3))
-    for k in range(3):
-        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = q[k], v[k], tau[k]
-        mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, data, M)
-        close = {"rtol": 1e4 * RECORDS[engine].eps, "atol": 1e3 * RECORDS[engine].eps}
-        assert np.allclose(of.mass_matrix(q)[k], M, **close)
-        assert np.allclose(of.bias(q, v)[k], data.qfrc_bias, **close)
-        assert np.allclose(of.acceleration(q, v, tau)[k], data.qacc, **close)

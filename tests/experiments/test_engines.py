@@ -42,7 +42,7 @@ import numpy as np
 import tmt
 
 from . import EngineRecord
-from .outside.bodies import links_of, numbers_of
+from .outside.bodies import numbers_of
 from .outside.model import ReadModel
 from .outside.order import Order
 
@@ -61,9 +61,6 @@ class Model(ReadModel):
     def fields(self):
         told = numbers_of(self.tree)
         return {{name: told[name] for name in told if name not in ("about_origin", "{untold}")}}
-
-    def links(self, at):
-        return links_of(self.tree, at.x)
 
     def set_field(self, name, values):
         if name == "gravity":
@@ -261,7 +258,7 @@ def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_
 class OfTree(ReadModel):
     """A Tree as an engine that tells where its bodies are."""
 
-    has_places = True
+    has_links = True
 
     def __init__(self, tree):
         self.tree, self.stated = tree, numbers_of(tree)

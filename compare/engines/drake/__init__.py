@@ -1,6 +1,5 @@
 """Drake's MultibodyPlant of a robot's file; only where pydrake is installed (the extra `drake`)."""
 
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from ..outside.bodies import Body, Link, Numbers
 from ..outside.file import File, OtherJoints, OtherNames
 from ..outside.mjcf_text import original_or_copy
 from ..outside.model import ReadModel
-from ..outside.order import ANGLES, Convention, Order, State
+from ..outside.order import ANGLES, Order, State, of_free
 from .plant import add_passive, fixed_force, joints_of, parsed
 from .simulation import DISCRETE, SCHEMES, Simulation
 
@@ -27,9 +26,6 @@ METHODS: dict[str, tuple[int | None, str]] = {
 for name in ("RK3", "RK5", "Radau3"):
     METHODS[f"{name} adaptive"] = None, f"drake_{SCHEMES[name][1]}_adaptive"
 METHODS[DISCRETE] = 1, "semi_implicit_euler"
-CONVENTION = Convention(
-    ball=ANGLES, rotation_first=True, angular_first=True, angular_in_world=True, balls_in_parent=True
-)
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int | None, str]]:
@@ -38,16 +34,19 @@ def methods_for(tree: Tree) -> dict[str, tuple[int | None, str]]:
 
 
 class Model(ReadModel):
-    has_places = True
+    has_links = True
 
     def __init__(self, file: File, precision: str):
         self.file = file
         self.inertias: dict[Any, Any] = {}  # of bodies that are set
         self.simulated: tuple[object, ...] | None = None  # what the last simulation is of
+        self.dual: tuple[Any, Any] | None = None  # the plant over dual numbers, and a context
         plant, self.source, self.copied = original_or_copy(file.path, self.read)
         joints = {k: plant.get_joint(index) for index, k in self.joints.items()}
         starts = {k: (joint.position_start(), joint.velocity_start()) for k, joint in joints.items()}
-        self.order = Order(file, starts, CONVENTION)
+        for k, (q, v) in list(starts.items()):
+            starts |= of_free(k, (q + 4, v + 3), (q, v)) if file.is_free(k) else {}
+        self.order = Order(file, starts, ball=ANGLES, angular_in_world=True, balls_in_parent=True)
         armature, damping = np.zeros((2, file.coordinates.nv))
         for joint in joints.values():
             place = self.order.v[joint.velocity_start() :][: joint.num_velocities()]
@@ -92,7 +91,7 @@ class Model(ReadModel):
 
     def settle(self) -> None:
         """Make the plant of single states, without damping and springs, which act as part of the force there."""
-        self.simulated = None
+        self.simulated = self.dual = None
         self.plant = self.plant_of(0.0, has_springs=False)
         self.context = self.plant.CreateDefaultContext()
         self.set_numbers(self.plant, self.context, acts=False)
@@ -114,13 +113,9 @@ class Model(ReadModel):
         """Balls have no rotor and no spring, and the damping of a free body is in other axes."""
         wrong, self.used[name] = values != self.used[name], values
         self.settle()
-        free, balls = set[int](), set[int]()
-        for k in self.order.starts:
-            speeds = np.ravel(self.order.speeds(k)).tolist()
-            free.update(speeds if self.file.is_free(k) else [])
-            balls.update(speeds if self.file.kinds[k] == "ball" else [])
-        unable = {"gravity": set[int](), "damping": free}.get(name, balls)
-        return not wrong[list(unable)].any()
+        is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
+        unable = self.order.is_of_free() | (is_of_ball & (name != "damping"))
+        return name == "gravity" or not wrong[unable].any()
 
     def links(self, at: State) -> list[Link]:
         from pydrake.multibody.tree import BodyIndex
@@ -167,25 +162,22 @@ class Model(ReadModel):
     @property
     def quantities(self) -> tuple[str, ...]:
         """Quaternions do not move like numbers, nor do the angles of a ball."""
-        return super().quantities + ("derivatives",) * (not self.order.has_rotations)
+        return super().quantities + ("derivatives",) * (not self.file.coordinates.has_balls)
 
     def derivatives(self, at: State, force: Array) -> Array:
         """By AutoDiffXd, Drake's dual numbers."""
         from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
         n, values = at.u.size, InitializeAutoDiff(np.concatenate([at.x, at.u, force]))[:, 0]
+        if self.dual is None:
+            plant = self.plant.ToAutoDiffXd()
+            self.dual = plant, plant.CreateDefaultContext()
         plant, context = self.dual
         context.SetTimeStateAndParametersFrom(self.context)
         plant.SetPositionsAndVelocities(context, values[: 2 * n])
         plant.get_applied_generalized_force_input_port().FixValue(context, values[2 * n :])
         accelerations = plant.get_generalized_acceleration_output_port().Eval(context)
         return np.array(np.split(ExtractGradient(accelerations), 3, axis=1))
-
-    @cached_property
-    def dual(self) -> tuple[Any, Any]:
-        """The plant over dual numbers, and a context; numbers are those of self.context."""
-        plant = self.plant.ToAutoDiffXd()
-        return plant, plant.CreateDefaultContext()
 
     def prepare(self, course: Course) -> None:
         self.simulation(course)

@@ -23,13 +23,9 @@ class Simulation:
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
         self.plant, self.order = plant, order
-        turned = [
-            speed
-            for k in order.starts
-            if order.file.kinds[k] == "ball"
-            for speed in np.ravel(order.speeds(k))
-        ]
-        is_constant = course.servos is None and not course.tau[turned].any()
+        is_of_ball = np.array(order.file.coordinates.kinds_of_speeds) == "ball"
+        turns = course.tau[order.is_of_free() | is_of_ball].any()
+        is_constant = course.servos is None and not turns
         simulator = self.simulator = Simulator(plant if is_constant else self.with_force(course))
         self.context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
         if is_constant:

@@ -77,34 +77,23 @@ def is_another(values: np.ndarray, stated: Numbers, number: str, eps: float) -> 
 
 
 def each(model: ReadModel, quantity: str, *values: Array) -> Array:
-    """A quantity at many states, (states, ...)."""
-    return np.array([QUANTITIES[quantity](model, *state) for state in zip(*values)], dtype=float)
+    """A quantity at many states of the Tree, (states, ...)."""
+    return np.array([value(model, quantity, *state) for state in zip(*values)], dtype=float)
 
 
-def mass_matrix(model: ReadModel, q: Array) -> Array:
-    at = model.order.state(q)
-    return at.S.T @ model.mass_matrix(at) @ at.S
-
-
-def bias(model: ReadModel, q: Array, v: Array) -> Array:
+def value(
+    model: ReadModel, quantity: str, q: Array, v: Array | None = None, force: Array | None = None
+) -> Array:
     at = model.order.state(q, v)
-    return at.S.T @ model.bias(at)
-
-
-def acceleration(model: ReadModel, q: Array, v: Array, force: Array) -> Array:
-    at = model.order.state(q, v)
-    return np.asarray(np.linalg.solve(at.S, model.acceleration(at, at.force(force)) - at.c))
-
-
-def derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> Array:
-    """Of a robot without rotations of three angles: S is a permutation."""
-    at = model.order.state(q, v)
-    return np.array([at.S.T @ by @ at.S for by in model.derivatives(at, at.force(force))])
-
-
-QUANTITIES: dict[str, Callable[..., Array]] = {
-    "mass_matrix": mass_matrix, "bias": bias, "acceleration": acceleration, "derivatives": derivatives,
-}  # fmt: skip
+    if quantity == "mass_matrix":
+        return at.S.T @ model.mass_matrix(at) @ at.S
+    if quantity == "bias":
+        return at.S.T @ model.bias(at)
+    if quantity == "acceleration":
+        return np.linalg.solve(at.S, model.acceleration(at, at.force(force)) - at.c)
+    return np.array(
+        [at.S.T @ by @ at.S for by in model.derivatives(at, at.force(force))]
+    )  # S is a permutation
 
 
 def seconds_of_derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> float:

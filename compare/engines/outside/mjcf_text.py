@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Generic, NamedTuple, TypeVar
+from typing import TypeVar
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,24 +12,20 @@ from ...core.errors import described
 from .file import OtherJoints, OtherNames, Unread
 
 Model = TypeVar("Model")
+Copied = tuple[Model, Path | str, tuple[str, str] | None]
 REFUSED = "Refused"  # the kind of an error that the engine raises
 FROM_FILES = "mesh", "hfield"  # of geoms
 # of a body in the compiled model
 FIELDS = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
 
 
-class Copied(NamedTuple, Generic[Model]):
-    """What an engine has read."""
-
-    model: Model
-    source: Path | str  # the file, or the text of its copy
-    why: tuple[str, str] | None = None  # kind and message of the error about the file; None: it is no copy
-
-
 def original_or_copy(path: Path, read: Callable[[Path], Model]) -> Copied[Model]:
-    """What an engine reads of a file, or, if it raises, of a copy with `whole_text`; of a URDF there is none."""
+    """What an engine reads of a file, or, if it raises, of a copy with `whole_text`; of a URDF there is none.
+
+    The model; the file, or the text of its copy; kind and message of the error about the file, None: it is no copy.
+    """
     try:
-        return Copied(read(path), path)
+        return read(path), path, None
     except Exception as error:
         if path.suffix == ".urdf":
             raise
@@ -40,7 +36,7 @@ def original_or_copy(path: Path, read: Callable[[Path], Model]) -> Copied[Model]
     with TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
         copy.write_text(text, encoding="utf-8")
-        return Copied(read(copy), text, (kind, " ".join(message.split())))
+        return read(copy), text, (kind, " ".join(message.split()))
 
 
 def whole_text(path: Path) -> str:

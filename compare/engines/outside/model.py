@@ -44,7 +44,9 @@ class ReadModel(ABC):
     drops: ClassVar[tuple[str, ...]] = ()
     way: ClassVar[str] = FROM_FILE
     unwritten: ClassVar[tuple[str, ...]] = ()  # numbers that a URDF cannot state
-    has_places: ClassVar[bool] = False  # whether it tells where bodies and joints are
+    has_links: ClassVar[bool] = (
+        False  # whether it is asked about its bodies: not where it has them of this program
+    )
     copied: tuple[str, str] | None = None  # why it has read a copy of the file
     file: File
     order: Order
@@ -67,9 +69,9 @@ class ReadModel(ABC):
         gravity (3,) m/s2; armature, damping, stiffness (nv,); a name that is missing: it does not tell.
         """
 
-    @abstractmethod
     def links(self, at: State) -> list[Link]:
-        """Its bodies; where has_places at a state."""
+        """Its bodies at a state, where has_links."""
+        return []
 
     def set_field(self, name: str, values: Array) -> bool:
         """Set one of `fields`; False: that is not possible."""
@@ -120,22 +122,20 @@ class ReadModel(ABC):
     def numbers(self) -> Numbers:
         """What it has read, by name: `fields`, and the numbers of its bodies.
 
-        mass (joints,) kg and moments (joints, 3) kg m2, ascending: of all bodies together that move with a joint and not with
-        the next one, 0 if there is none, about their common centre of mass. Where has_places, of the same bodies com (joints,
+        Where has_links, mass (joints,) kg and moments (joints, 3) kg m2, ascending: of all bodies together that move with a
+        joint and not with the next one, 0 if there is none, about their common centre of mass. Of the same bodies com (joints,
         3) m, the centre of mass, and inertia (joints, 3, 3) kg m2 about it: in the world, at the positions `reference` of
         `stated`. Of the joints there axis (joints, 3) and anchor (joints, 3) m, on the axis of a hinge next to the stated one,
         at the centre of a ball; 0 where that says nothing. com_moved, axis_moved and anchor_moved are those at the positions
         `moved`.
         """
-        count, reference = len(self.file.names), self.stated["reference"]
+        if not self.has_links:
+            return self.fields()
+        count, reference, moved = len(self.file.names), self.stated["reference"], self.stated["moved"]
         mass, com, inertia = together(self.links_at(reference), count)
-        numbers = {**self.fields(), "mass": mass, "moments": np.linalg.eigvalsh(inertia)}
-        if self.has_places:
-            moved = self.stated["moved"]
-            numbers |= {"com": com, "inertia": inertia, **self.lines(reference, "")}
-            _, numbers["com_moved"], _ = together(self.links_at(moved), count)
-            numbers |= self.lines(moved, "_moved")
-        return numbers
+        numbers = {"mass": mass, "moments": np.linalg.eigvalsh(inertia), "com": com, "inertia": inertia}
+        _, numbers["com_moved"], _ = together(self.links_at(moved), count)
+        return {**self.fields(), **numbers, **self.lines(reference, ""), **self.lines(moved, "_moved")}
 
     def links_at(self, q: Array) -> list[Link]:
         return self.links(self.order.state(q))

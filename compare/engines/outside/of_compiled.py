@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from functools import cache
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ...robots.actuators import Controller
 from .. import GRID, Array, Course
-from .bodies import Body, Link, Numbers
+from .bodies import Numbers
 from .file import File, Unread
 from .model import FROM_COMPILED, ReadModel
-from .order import Order, State, rotation
+from .order import Order
 
 if TYPE_CHECKING:
     from ..mujoco.handed_on import Bare
@@ -37,12 +38,8 @@ class OfCompiled(ReadModel):
         self.driven = cache(self.made_driven)
         self.bare = self.made_bare(None)
         self.models = self.made_models(self.bare)
-        starts = {}
-        for k, (name, place) in enumerate(self.bare.places.items()):
-            of_slides = 3 * file.is_free(k)
-            if name.rsplit(" ", 1)[0] not in file.free or of_slides:
-                starts[k] = place.qpos.start - of_slides, place.dofs.start - of_slides
-        self.order = Order(file, starts)
+        places = enumerate(self.bare.places.values())
+        self.order = Order(file, {k: (place.qpos.start, place.dofs.start) for k, place in places})
         joints = self.bare.model.dof_jntid[self.bare.dofs]
         # of `fields`: MuJoCo's names, and the indices of the Tree's speeds
         self.where = {"armature": ("dof_armature", self.bare.dofs), "damping": ("dof_damping", self.bare.dofs),
@@ -54,7 +51,10 @@ class OfCompiled(ReadModel):
         from ..mujoco.source import Source
 
         source = Source(self.file.path, self.file.floating)
-        return Bare(source, self.file.names, self.rotors_in_joints, controller)
+        bare = Bare(source, self.file.names, self.rotors_in_joints, controller)
+        for name, (index, values) in self.fields_set.items():
+            attrgetter(name)(bare.model)[index] = values
+        return bare
 
     def made_models(self, bare: Bare) -> dict[str, Any]:
         """The engine's models of it by the names of methods; Unread if it does not have what that needs."""
@@ -71,20 +71,10 @@ class OfCompiled(ReadModel):
     def held(self, name: str) -> Array:
         """A field of the engine's models by MuJoCo's name of it."""
 
-    @abstractmethod
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        """One of the engine's models in which a field, by MuJoCo's name of it, has these values at indices."""
-
     def made_driven(self, key: tuple[float | None, ...]) -> tuple[Bare, dict[str, Any]]:
-        """Models in which the actuators act with these controls, with all that is set in the others."""
+        """Models in which the actuators act with these controls."""
         bare = self.made_bare(self.controllers[key])
-        return bare, self.with_all_fields(self.made_models(bare))
-
-    def with_all_fields(self, models: dict[str, Any]) -> dict[str, Any]:
-        """Models with all that is set in `models`."""
-        for name, place in self.fields_set.items():
-            models = {method: self.with_field(model, name, *place) for method, model in models.items()}
-        return models
+        return bare, self.made_models(bare)
 
     def of_course(self, course: Course) -> tuple[Bare, Any, Array]:
         """The models that a course needs: MuJoCo's, the engine's; and the torque that is applied beside its actuators, (nv,)."""
@@ -109,26 +99,9 @@ class OfCompiled(ReadModel):
     def set_field(self, name: str, values: Array) -> bool:
         field, index = self.where[name]
         self.fields_set[field] = index, values
-        for method, model in self.models.items():
-            self.models[method] = self.with_field(model, field, index, values)
+        self.bare = self.made_bare(None)
+        self.models = self.made_models(self.bare)
         return True
-
-    def links(self, at: State) -> list[Link]:
-        """Bodies at the place that they have on their parents where all joints are 0: enough for masses and moments."""
-        names = "pos", "quat", "mass", "ipos", "iquat", "inertia"
-        position, turn, mass, com, axes, moments = (self.held(f"body_{name}") for name in names)
-        parents, bodies = self.held("body_parentid"), self.held("jnt_bodyid")
-        joints = {int(bodies[place.joint]): k for k, place in enumerate(self.bare.places.values())}
-        links = [Link(0, None, None, np.eye(3), np.zeros(3), Body(0.0, np.zeros(3), np.zeros((3, 3))))]
-        for body in range(1, len(mass)):
-            parent, R = links[parents[body]], rotation(axes[body]).as_matrix()
-            own = Body(float(mass[body]), com[body], R @ np.diag(moments[body]) @ R.T)
-            there = (
-                parent.turn @ rotation(turn[body]).as_matrix(),
-                parent.origin + parent.turn @ position[body],
-            )
-            links.append(Link(body, int(parents[body]), joints.get(body), *there, own))
-        return links[1:]
 
     @abstractmethod
     def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:

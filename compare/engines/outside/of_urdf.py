@@ -21,21 +21,13 @@ class OfUrdf(SteppedModel):
 
     def __init__(self, file: File, precision: str):
         from ..mujoco.handed_on import urdf
-        from ..mujoco.names import joint_places
         from ..mujoco.source import Source
 
-        model = Source(file.path, file.floating).model
         try:
-            text = urdf(model)
+            text = urdf(Source(file.path, file.floating).model)
         except ValueError as error:
             raise Unwritten(str(error)) from None
         self.file, nv = file, file.coordinates.nv
-        places, joints = joint_places(model), file.coordinates.places.joints
-        free = {f"{name} {part}" for name in file.free for part in ("x", "y", "z", "turn")}
-        speeds = [(joint, name) for joint, name in zip(joints, file.names) for _ in joint.speeds]
-        self.q_start = np.array([joint.q.start for joint, _ in speeds])  # of each speed
-        self.rest = np.array([model.qpos_spring[places[name].qpos.start] for _, name in speeds])
-        self.is_free = np.array([name in free for _, name in speeds])
         self.load(text)
         self.read = {"armature": np.zeros(nv), "damping": self.damping(), "stiffness": np.zeros(nv)}
 
@@ -55,7 +47,8 @@ class OfUrdf(SteppedModel):
 
     def other_force(self, q: Array, v: Array) -> Array:
         """Of springs."""
-        return np.asarray(self.read["stiffness"] * (self.rest - q[self.q_start]))
+        first = self.file.coordinates.places.first_positions
+        return np.asarray(self.read["stiffness"] * (self.stated["rest"] - q)[first])
 
     def fields(self) -> Numbers:
         return {"gravity": self.gravity(), **self.read}
@@ -65,7 +58,7 @@ class OfUrdf(SteppedModel):
             self.set_gravity(values)
             return True
         self.read[name] = np.array(values)
-        return not values[self.is_free].any()
+        return not values[self.order.is_of_free()].any()
 
     def armature_matrix(self) -> Array:
         """In the engine's order."""

@@ -12,6 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from tmt.derivation.coordinates import Joint
+
 from .. import Array
 from .file import File
 
@@ -46,21 +48,6 @@ VECTOR = Code(3, lambda q: rotation(q).as_rotvec(), lambda x: quaternion(Rotatio
 ANGLES = Code(3, lambda q: rotation(q).as_euler("xyz"), lambda x: quaternion(Rotation.from_euler("xyz", x)))
 
 
-class Convention(NamedTuple):
-    """How an engine has free joints and balls; by default as the Tree."""
-
-    free: Code = WXYZ  # the rotation of a free joint
-    ball: Code = WXYZ
-    rotation_first: bool = False  # in the positions of a free joint
-    angular_first: bool = False  # in its speeds
-    linear_in_world: bool = True
-    angular_in_world: bool = False
-    balls_in_parent: bool = False  # a ball's angular velocity is in the axes of the body that carries it
-
-
-AS_THE_TREE = Convention()
-
-
 class State(NamedTuple):
     """A state of the Tree in an engine's coordinates."""
 
@@ -74,41 +61,42 @@ class State(NamedTuple):
         return np.asarray(np.linalg.solve(self.S.T, force))
 
 
+def of_free(ball: int, linear: tuple[int, int], rotation: tuple[int, int]) -> Starts:
+    """Where the joints of a free joint begin, by the number of its ball: (q, v) of its slides and of the ball."""
+    slides = {ball - 3 + i: (linear[0] + i, linear[1] + i) for i in range(3)}
+    return slides | {ball: rotation}
+
+
 @dataclass(frozen=True)
 class Order:
-    """The coordinates of an engine.
-
-    starts: where its q and v of a joint begin, by the number of the joint in the Tree; of a free joint by that of its ball.
-    """
+    """The coordinates of an engine. starts: where its q and v of each joint of the Tree begin, by the number of the joint."""
 
     file: File
     starts: Starts
-    convention: Convention = AS_THE_TREE
+    free: Code = WXYZ  # the rotation of a free joint
+    ball: Code = WXYZ
+    linear_in_world: bool = True  # the speeds of a free joint
+    angular_in_world: bool = False
+    balls_in_parent: bool = False  # a ball's angular velocity is in the axes of the body that carries it
     circles: tuple[int, ...] = ()  # joints whose angle is stated by its cosine and sine
     # (nq,): the Tree's positions where those of hinges and slides are 0 in the engine
     reference: Array | float = 0.0
     # of free joints, by the number of the ball: the point of the body whose velocity the engine has
     points: Mapping[int, Array] = field(default_factory=dict)
 
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        return self.file.coordinates.places.joints
+
     @cached_property
     def parts(self) -> list[tuple[slice, slice, Code]]:
         """The numbers of positions in the Tree, those in the engine, and how these are stated."""
-        parts, about = [], self.convention
-        joints = self.file.coordinates.places.joints
+        codes = [CIRCLE if k in self.circles else NUMBER for k in range(len(self.joints))]
+        parts = []
         for k, (start, _) in self.starts.items():
-            place, code = joints[k].q, CIRCLE if k in self.circles else NUMBER
-            if self.file.is_free(k):
-                code = about.free
-                linear = start + code.size * about.rotation_first
-                first = place.start - 3
-                parts += [
-                    (slice(first + i, first + i + 1), slice(linear + i, linear + i + 1), NUMBER)
-                    for i in range(3)
-                ]
-                start += 3 * (not about.rotation_first)
-            elif joints[k].kind == "ball":
-                code = about.ball
-            parts.append((place, slice(start, start + code.size), code))
+            if self.joints[k].kind == "ball":
+                codes[k] = self.free if self.file.is_free(k) else self.ball
+            parts.append((self.joints[k].q, slice(start, start + codes[k].size), codes[k]))
         return parts
 
     @cached_property
@@ -116,24 +104,17 @@ class Order:
         """The place in the Tree's v of each of the engine's speeds, (nv,)."""
         places = np.empty(self.file.coordinates.nv, int)
         for k, (_, start) in self.starts.items():
-            for first, speeds in zip(self.blocks(k, start), self.speeds(k)):
-                places[first : first + len(speeds)] = speeds
+            speeds = self.joints[k].speeds
+            places[start : start + len(speeds)] = speeds
         return places
 
-    def speeds(self, joint: int) -> list[range]:
-        """The Tree's speeds of a joint; of a free one linear and angular."""
-        speeds = self.file.coordinates.places.joints[joint].speeds
-        return [range(speeds.start - 3, speeds.start), speeds] if self.file.is_free(joint) else [speeds]
-
-    def blocks(self, joint: int, start: int) -> list[int]:
-        """Where they begin in the engine's."""
-        if not self.file.is_free(joint):
-            return [start]
-        return [start + 3, start] if self.convention.angular_first else [start, start + 3]
-
-    @property
-    def has_rotations(self) -> bool:
-        return bool(self.file.coordinates.has_balls)
+    def is_of_free(self) -> Array:
+        """Whether a speed of the Tree is that of a free joint, (nv,)."""
+        free = np.zeros(self.file.coordinates.nv, bool)
+        for k, joint in enumerate(self.joints):
+            if self.file.is_free(k):
+                free[joint.qd.start - 3 : joint.qd.stop] = True
+        return free
 
     def engine_positions(self, q: Array) -> Array:
         x, moved = np.empty(max(part.stop for _, part, _ in self.parts)), q - self.reference
@@ -165,25 +146,27 @@ class Order:
 
     def speeds_at(self, q: Array, v: Array | None = None) -> tuple[Array, Array]:
         """S and c at a state."""
-        S, c, about = np.zeros((len(self.v),) * 2), np.zeros(len(self.v)), self.convention
+        S, c = np.zeros((len(self.v),) * 2), np.zeros(len(self.v))
         S[np.arange(len(self.v)), self.v] = 1.0
         for k, (_, start) in self.starts.items():
-            joint = self.file.coordinates.places.joints[k]
+            joint, rows = self.joints[k], slice(start, start + 3)
             if joint.kind != "ball":
                 continue
             R = rotation(q[joint.q]).as_matrix()
-            *linear, rows = (slice(first, first + 3) for first in self.blocks(k, start))
-            if not linear:
-                S[rows, joint.qd] = R if about.balls_in_parent else np.eye(3)
+            is_free = self.file.is_free(k)
+            is_turned = self.angular_in_world if is_free else self.balls_in_parent
+            S[rows, joint.qd] = R if is_turned else np.eye(3)
+            if not is_free:
                 continue
-            in_linear = np.eye(3) if about.linear_in_world else R.T
-            S[rows, joint.qd] = R if about.angular_in_world else np.eye(3)
-            of_origin, point = slice(joint.qd.start - 3, joint.qd.start), R @ self.points.get(k, np.zeros(3))
-            S[linear[0], of_origin] = in_linear
-            S[linear[0], joint.qd] = in_linear @ np.cross(R, point[:, None], axis=0)
+            first = self.starts[k - 3][1]
+            linear, of_origin = slice(first, first + 3), slice(joint.qd.start - 3, joint.qd.start)
+            in_linear = np.eye(3) if self.linear_in_world else R.T
+            point = R @ self.points.get(k, np.zeros(3))
+            S[linear, of_origin] = in_linear
+            S[linear, joint.qd] = in_linear @ np.cross(R, point[:, None], axis=0)
             if v is not None:
                 w = R @ v[joint.qd]
-                c[linear[0]] = in_linear @ np.cross(w, np.cross(w, point))
-                if not about.linear_in_world:  # the axes turn
-                    c[linear[0]] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
+                c[linear] = in_linear @ np.cross(w, np.cross(w, point))
+                if not self.linear_in_world:  # the axes turn
+                    c[linear] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
         return S, c

@@ -152,13 +152,12 @@ def compare_quantity(
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
     unit, pair = quantity.unit(sample.tree), (distances["set"][worst], tolerance[worst])
     check = result.check(record.label, f"{name} to exact", *pair, unit, note, True, about=About.ENGINE)
-    state = {f"worst_{name}": " ".join(of_state) for name, of_state in numbers.items()}
     result.rows.append(EngineRow(
         engine=record.label, precision=record.precision, quantity=name, unit=unit, states=len(sample.q),
         as_read_over_bar=float(over(distances["read"], tolerance).max()), worst_difference=check.value,
         bar=check.tolerance, difference_over_bar=check.over_tolerance,
         difference_eps=float(over(distances["set"], eps * size).max()),
-        mujoco_eps=float(over(distances["mujoco"], EPS * size).max()), **state, passed=check.passed,
+        mujoco_eps=float(over(distances["mujoco"], EPS * size).max()), passed=check.passed,
     ))  # fmt: skip
 
 
@@ -175,7 +174,7 @@ def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:
 
     has_errors = any(row.worst_error for row in result.tables["engines_methods"])
     drawings = {
-        drawn.draw_distances: result.rows, drawn.draw_errors: has_errors,
+        drawn.draw_errors: has_errors,
         drawn.draw_servos: result.tables["engines_servos"], drawn.draw_batches: result.tables["engines_batches"],
     }  # fmt: skip
     yield from (partial(draw, result) for draw, is_drawn in drawings.items() if is_drawn)
