@@ -118,9 +118,8 @@ class Motion(NamedTuple):
     ended: str | Array | None = None
     steps: int | None = None  # that the method took; None: not known
     seconds: float | None = None  # of the run, where the engine measures it in a process of its own
-    seconds_alone: float | None = (
-        None  # of its steps without Python's share; None: there is none, or it is not known
-    )
+    # of its steps without Python's share; None: there is none, or it is not known
+    seconds_alone: float | None = None
 
     @property
     def states(self) -> Array:

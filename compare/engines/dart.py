@@ -38,23 +38,17 @@ class Model(OfUrdf):
         never = self.world.getDeactivationOptions()
         never.mEnabled = False
         self.world.setDeactivationOptions(never)
-        self.joints: dict[int, Any] = {}  # by their numbers in the Tree
+        starts, self.dampers = {}, dict[int, Any]()  # the latter by their places in q and v
         for k, name in enumerate(self.file.names):
-            joint = self.skeleton.getJoint(name.removesuffix(" turn") if self.file.is_free(k) else name)
-            if joint is not None:  # else it is a part of a free joint
-                self.joints[k] = joint
-        places = {k: joint.getIndexInSkeleton(0) for k, joint in self.joints.items()}  # in q and in v
-        starts = {k: (place, place) for k, place in places.items()}
-        for k in filter(self.file.is_free, places):
-            starts |= of_free(k, (places[k] + 3,) * 2, starts[k])
+            is_free = self.file.is_free(k)
+            joint = self.skeleton.getJoint(name.removesuffix(" turn") if is_free else name)
+            if joint is None:  # a part of a free joint
+                continue
+            place = joint.getIndexInSkeleton(0)
+            starts |= of_free(k, (place + 3, place + 3), (place, place)) if is_free else {k: (place, place)}
+            if not is_free:
+                self.dampers[place] = joint
         self.order = Order(self.file, starts, free=VECTOR, angular_in_world=True)
-        self.dampers = {places[k]: joint for k, joint in self.joints.items() if not self.file.is_free(k)}
-
-    def damping(self) -> Array:
-        damping = np.zeros(len(self.order.v))
-        for place, joint in self.dampers.items():
-            damping[self.order.v[place]] = joint.getDampingCoefficient(0)
-        return damping
 
     def gravity(self) -> Array:
         return np.array(self.world.getGravity())
@@ -69,7 +63,7 @@ class Model(OfUrdf):
     def start(self, at: State, dt: float, method: str | None) -> None:
         self.world.setTimeStep(dt)
         self.rotors = self.read["armature"] / dt  # coefficients of the dampers that are armature
-        damping = self.rotors + (0.0 if method is None else self.read["damping"])
+        damping = self.rotors + (0.0 if method is None else self.stated["damping"])
         for place, joint in self.dampers.items():
             joint.setDampingCoefficient(0, damping[self.order.v[place]])
         self.set_state(at)

@@ -4,6 +4,7 @@ Its coordinates differ from MuJoCo's: slides before hinges in a body; no `ref`; 
 the axes of its joint; of a free body the velocity of its centre of mass and the angular velocity in world axes.
 """
 
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -28,7 +29,6 @@ USED = "implicitfast", "RK4"  # integrators of SolverMuJoCo; the others are thos
 UNCONSTRAINED = 0b11111  # MuJoCo's flags that disable all constraints
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
 PASSIVE = "damping", "stiffness"
-AXES = {"angular_in_world": True, "balls_in_parent": True}
 
 
 def by_mujoco(methods: dict[str, tuple[int, str]]) -> dict[str, tuple[int, str]]:
@@ -92,7 +92,8 @@ class Model(SteppedModel):
             elif kind_of(compiled, place.joint) in ("hinge", "slide"):
                 reference[joints[k].q] = compiled.qpos0[place.qpos.start]
             nq, nv = nq + len(place.qpos), nv + len(place.dofs)
-        return Order(file, starts, XYZW, XYZW, **AXES, reference=reference, points=points)
+        order = Order(file, starts, XYZW, XYZW, angular_in_world=True, balls_in_parent=True)
+        return replace(order, reference=reference, points=points)
 
     def made_solver(self, method: str) -> Any:
         if method == FEATHERSTONE:

@@ -40,7 +40,8 @@ class Model(ReadModel):
         is_freed = self.file.floating and 'type="floating"' not in path.read_text(encoding="utf-8")
         self.model = build(str(path), *[self.pinocchio.JointModelFreeFlyer()] * is_freed)
         self.last: dict[int, int] = {}  # the number in the Tree of the last joint of each of Pinocchio's
-        starts, circles, free = {}, [], iter(self.file.free)
+        starts: dict[int, tuple[int, int]] = {}
+        circles, free = [], iter(self.file.free)
         for number, joint in list(enumerate(self.model.joints))[1:]:  # without the world
             parts = joint.extract().joints if joint.shortname() == "JointModelComposite" else [joint]
             name = self.model.names[number].removeprefix("Composite_")

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from tmt import Tree
 
 from . import Array, EngineRecord
-from .outside.file import Unasked
+from .outside.file import Unwritten
 from .outside.of_urdf import OfUrdf
 from .outside.order import XYZW, Order, State, of_free
 
@@ -41,42 +41,31 @@ class Model(OfUrdf):
         import pybullet
         from pybullet_utils.bullet_client import BulletClient
 
-        self.bullet, is_fixed = BulletClient(pybullet.DIRECT), not self.file.free
+        self.bullet, self.free = BulletClient(pybullet.DIRECT), len(self.file.free)
         with TemporaryDirectory() as folder:
-            (Path(folder) / "robot.urdf").write_text(text if is_fixed else without_world(text))
+            (Path(folder) / "robot.urdf").write_text(without_world(text) if self.free else text)
             flags = self.bullet.URDF_USE_INERTIA_FROM_FILE
-            self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=is_fixed, flags=flags)
-        # of the links, and of the joints that move them
+            self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=not self.free, flags=flags)
         numbers = range(self.bullet.getNumJoints(self.robot))
-        self.infos = [self.bullet.getJointInfo(self.robot, link) for link in numbers]
-        named = {info[1].decode(): link for link, info in enumerate(self.infos)}
-        # the joints of the Tree by their links; of a free base its ball
-        self.joints = dict(
-            sorted((named[name], k) for k, name in enumerate(self.file.names) if name in named)
-        )
-        starts = {
-            k: (7 * (not is_fixed) + i, 6 * (not is_fixed) + i) for i, k in enumerate(self.joints.values())
-        }
-        self.links_moved, self.points = list(self.joints), dict[int, Array]()
-        if not is_fixed:
-            ball = self.file.names.index(f"{self.file.free[0]} turn")
+        named = {self.bullet.getJointInfo(self.robot, link)[1].decode(): link for link in numbers}
+        # the joints of the Tree by the links that they move, without a free base
+        joints = dict(sorted((named[name], k) for k, name in enumerate(self.file.names) if name in named))
+        starts = {k: (7 * self.free + i, 6 * self.free + i) for i, k in enumerate(joints.values())}
+        self.moved, points = list(joints), dict[int, Array]()
+        for ball in filter(self.file.is_free, range(len(self.file.names))):
             *_, centre, axes = self.bullet.getDynamicsInfo(self.robot, BASE)[:5]
-            self.joints[BASE] = ball
+            self.centre, self.axes = np.array(centre), Rotation.from_quat(axes)
             starts |= of_free(ball, (0, 3), (3, 0))
-            self.points, self.axes = {ball: np.array(centre)}, Rotation.from_quat(axes)
-        self.order = Order(self.file, starts, free=XYZW, angular_in_world=True, points=self.points)
+            points[ball] = self.centre
+        self.order = Order(self.file, starts, free=XYZW, angular_in_world=True, points=points)
         for link in (BASE, *numbers):
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
-        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(self.links_moved)))
+        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(self.moved)))
 
     def apply(self, mode: int, forces: Array) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
-        self.bullet.setJointMotorControlArray(self.robot, self.links_moved, mode, forces=forces.tolist())
-
-    def damping(self) -> Array:
-        of_joints = [self.infos[link][6] for link in self.links_moved]
-        return self.order.tree_numbers(np.r_[np.zeros(6 * len(self.points)), of_joints])
+        self.bullet.setJointMotorControlArray(self.robot, self.moved, mode, forces=forces.tolist())
 
     def gravity(self) -> Array:
         engine = self.bullet.getPhysicsEngineParameters()
@@ -91,15 +80,15 @@ class Model(OfUrdf):
 
     def base(self, x: Array) -> tuple[Array, Rotation]:
         """The position of the centre of mass and the principal axes of a free base."""
-        (centre,), turn = self.points.values(), Rotation.from_quat(x[3:7])
-        return x[:3] + turn.apply(centre), turn * self.axes
+        turn = Rotation.from_quat(x[3:7])
+        return x[:3] + turn.apply(self.centre), turn * self.axes
 
     def split(self, x: Array) -> tuple[Array, Array]:
         """Positions of the joints, and (nv, nv): speeds in the axes of the base from those in the world's."""
         T = np.eye(len(self.order.v))
-        if self.points:
+        if self.free:
             T[:3, :3] = T[3:6, 3:6] = self.base(x)[1].as_matrix().T
-        return x[7 * len(self.points) :], T
+        return x[7 * self.free :], T
 
     def mass_matrix(self, at: State) -> Array:
         q, T = self.split(at.x)
@@ -108,20 +97,20 @@ class Model(OfUrdf):
 
     def bias(self, at: State) -> Array:
         q, T = self.split(at.x)
-        if self.points:
+        if self.free:
             place, axes = self.base(at.x)
             q = np.concatenate([place, Rotation.from_euler("xyz", axes.as_euler("XYZ")).as_quat(), q])
         state = (values.tolist() for values in (q, T @ at.u, T @ at.c))
         h = np.array(self.bullet.calculateInverseDynamics(self.robot, *state))
-        if self.points:
+        if self.free:
             h[:6] = np.roll(h[:6], 3)
         return T.T @ h
 
     def start(self, at: State, dt: float, method: str | None) -> None:
         self.bullet.setTimeStep(dt)
-        damping = np.zeros_like(at.u) if method is None else self.read["damping"][self.order.v]
-        (q, _), free = self.split(at.x), 6 * len(self.points)
-        for link, coefficient, *state in zip(self.links_moved, damping[free:], q, at.u[free:]):
+        damping = np.zeros_like(at.u) if method is None else self.stated["damping"][self.order.v]
+        (q, _), free = self.split(at.x), 6 * self.free
+        for link, coefficient, *state in zip(self.moved, damping[free:], q, at.u[free:]):
             self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
             self.bullet.resetJointState(self.robot, link, *state)
         if free:
@@ -130,7 +119,7 @@ class Model(OfUrdf):
             self.bullet.resetBaseVelocity(self.robot, at.u[3:6], at.u[:3])
 
     def set_force(self, force: Array) -> None:
-        free = 6 * len(self.points)
+        free = 6 * self.free
         self.apply(self.bullet.TORQUE_CONTROL, force[free:])
         if free:
             place, _ = self.bullet.getBasePositionAndOrientation(self.robot)
@@ -142,18 +131,18 @@ class Model(OfUrdf):
         self.bullet.stepSimulation()
 
     def reached(self) -> tuple[Array, Array]:
-        states = self.bullet.getJointStates(self.robot, self.links_moved) or ()  # None of no joints
+        states = self.bullet.getJointStates(self.robot, self.moved) or ()  # None of no joints
         q, v = np.array([state[:2] for state in states]).reshape(-1, 2).T
-        for centre in self.points.values():
+        if self.free:
             place, axes = self.bullet.getBasePositionAndOrientation(self.robot)
             turn = Rotation.from_quat(axes) * self.axes.inv()
             linear, angular = self.bullet.getBaseVelocity(self.robot)
-            q, v = np.r_[place - turn.apply(centre), turn.as_quat(), q], np.r_[angular, linear, v]
+            q, v = np.r_[place - turn.apply(self.centre), turn.as_quat(), q], np.r_[angular, linear, v]
         return q, v
 
 
 def without_world(text: str) -> str:
-    """A URDF whose root is the link of its floating joint; Unasked if other joints stand on the world."""
+    """A URDF whose root is the link of its floating joint; Unwritten if other joints stand on the world."""
     robot = ElementTree.fromstring(text)
     carried: set[str] = set()
     for joint in robot.findall("joint"):
@@ -161,7 +150,7 @@ def without_world(text: str) -> str:
         if parent in carried or (joint.get("type") == "floating" and not carried):
             carried.add(child)
         elif joint.get("type") != "fixed":
-            raise Unasked("joints beside a free base")
+            raise Unwritten("joints stand on the world beside a free base")
         if parent not in carried:
             robot.remove(joint)
     for link in robot.findall("link"):

@@ -13,7 +13,6 @@ import numpy as np
 from tmt import Tree
 from tmt.methods import lone_speeds
 
-from ..robots.actuators import Controller
 from . import Array, Course, EngineRecord
 from .outside.file import File
 from .outside.of_compiled import METHODS as OF_MJX
@@ -50,12 +49,6 @@ class Model(OfCompiled):
         # data, by MuJoCo's model, the number of states, the device
         self.worlds: dict[tuple[int, int, str], Any] = {}
         self.graphs: dict[tuple[Any, ...], Any] = {}
-
-    def made_bare(self, controller: Controller | None) -> Bare:
-        bare = super().made_bare(controller)
-        if controller is None:
-            bare.model.opt.iterations = 0  # of its solver of constraints
-        return bare
 
     def put_model(self, model: Any) -> Any:
         return self.engine.put_model(model)

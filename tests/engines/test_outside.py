@@ -18,13 +18,8 @@ ROOT = Path(__file__).parents[2]
 ENGINES = [name for name, record in RECORDS.items() if record.reads_file and not Outside(name).unavailable()]
 pytestmark = pytest.mark.parametrize("engine", ENGINES)
 ROBOTS = [
-    ROOT / name
-    for name in (
-        "mjcf/arm.xml",
-        "tests/models/arm7.xml",
-        "tests/models/quadruped.xml",
-        "tests/models/pendulum_ball.xml",
-    )
+    ROOT / "mjcf/arm.xml",
+    *(ROOT / f"tests/models/{name}.xml" for name in ("arm7", "quadruped", "pendulum_ball")),
 ]
 BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
 PENDULUM = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" damping="0.1"/>

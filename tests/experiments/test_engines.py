@@ -16,7 +16,7 @@ from trees import tree_of_kinds
 
 from compare import engines
 from compare.core.check import About, Result
-from compare.engines import EngineRecord, Method
+from compare.engines import EngineRecord
 from compare.engines.outside.bodies import combined, links_of, numbers_of, size_of
 from compare.engines.outside.file import File
 from compare.engines.outside.model import FROM_FILE, ReadModel
@@ -167,14 +167,8 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
 def test_two_verdicts_stand_side_by_side(report):
     """As read, and as set: gravity can be set, mass and axis cannot; who takes no part is not counted among those who agree."""
     rows = {row["engine"]: row for row in table(report[0], "engines_answer")}
-    verdicts = {
-        label: (rows[label]["as_read"], rows[label]["as_set"]) for label in ("Right", "Upside", "Heavy")
-    }
-    assert verdicts == {
-        "Right": ("same", "same"),
-        "Upside": ("gravity", "same"),
-        "Heavy": ("mass", "not set"),
-    }
+    verdicts = {"Right": ("same", "same"), "Upside": ("gravity", "same"), "Heavy": ("mass", "not set")}
+    assert {label: (rows[label]["as_read"], rows[label]["as_set"]) for label in verdicts} == verdicts
     assert rows["Later"]["as_set"] == "same" and "Blind" not in rows
     shares = {(row["engine"], row["quantity"]): row for row in table(report[0], "engines")}
     assert float(shares["Upside", "bias"]["as_read_over_bar"]) > 1e6
@@ -312,11 +306,3 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     assert integrators.order_of(steps, errors, 1e-2) is None
     finer = [2.0**-k for k in range(7, 14)]
     assert integrators.order_of(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
-
-
-def test_a_step_is_compared_with_the_same_scheme():
-    setup, result = setup_of(), Result("engines")
-    for scheme, passes in (("semi_implicit_euler", True), ("explicit_euler", False)):
-        method = Method("mujoco", "Euler", 1, scheme)
-        integrators.compare_steps(result, setup, setup.engines["mujoco"], method)
-        assert result.checks[-1].passed == passes and result.checks[-1].tolerance < 1e-11  # rounding alone

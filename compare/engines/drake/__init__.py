@@ -184,14 +184,8 @@ class Model(ReadModel):
 
     def simulation(self, course: Course) -> Simulation:
         """That of a course; the last one is kept."""
-        key = (
-            course.method,
-            tuple(course.tau),
-            course.dt,
-            course.steps > 0,
-            course.tolerance,
-            bool(course.servos),
-        )
+        setting = course.method, course.dt, course.steps, course.tolerance
+        key = *setting, course.tau.tobytes(), course.servos is None
         if key != self.simulated:
             dt = course.dt if course.method == DISCRETE else 0.0
             plant = self.plant_of(dt, has_springs=True)

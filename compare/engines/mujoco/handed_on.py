@@ -130,6 +130,7 @@ class Bare:
         m.opt.disableflags &= ~bit("AUTORESET", "ACTUATION")
         m.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
         m.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # of constraints, which are off; both refuse PGS
+        m.opt.iterations = 0 if controller is None else m.opt.iterations
         if rotors_in_joints and hasattr(m, "actuator_armature"):
             m.dof_armature += rotors(m)
             m.actuator_armature[:] = 0.0

@@ -15,7 +15,7 @@ from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course
-from .bodies import Numbers, numbers_of, size_of
+from .bodies import numbers_of, size_of
 from .file import EngineError, File, Unread
 from .model import ReadModel
 
@@ -57,8 +57,11 @@ def read(name: str, file: File, tree: tmt.Tree, is_set: bool) -> ReadModel:
     for number, values in numbers.items():
         if np.shape(values) != np.shape(stated[number]):
             raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-    eps = FACTOR * record.eps
-    differing = [name for name in numbers if is_another(numbers[name], stated, name, eps)]
+    differing = []
+    for number, values in numbers.items():
+        most = np.abs(values - stated[number]).max(initial=0.0)
+        if not most <= FACTOR * record.eps * size_of(stated, number):
+            differing.append(number)
     mended = {number: is_set and model.mend(number, stated[number]) for number in differing}
     unwritten = tuple(number for number in model.unwritten if mended.get(number))
     model.reading = {
@@ -71,11 +74,6 @@ def read(name: str, file: File, tree: tmt.Tree, is_set: bool) -> ReadModel:
     return model
 
 
-def is_another(values: np.ndarray, stated: Numbers, number: str, eps: float) -> bool:
-    """Whether numbers that were read differ from those of the Tree by more than rounding."""
-    return not np.abs(values - stated[number]).max(initial=0.0) <= eps * size_of(stated, number)
-
-
 def each(model: ReadModel, quantity: str, *values: Array) -> Array:
     """A quantity at many states of the Tree, (states, ...)."""
     return np.array([value(model, quantity, *state) for state in zip(*values)], dtype=float)
@@ -85,15 +83,14 @@ def value(
     model: ReadModel, quantity: str, q: Array, v: Array | None = None, force: Array | None = None
 ) -> Array:
     at = model.order.state(q, v)
+    own_force = at.force(np.zeros_like(at.u) if force is None else force)
     if quantity == "mass_matrix":
         return at.S.T @ model.mass_matrix(at) @ at.S
     if quantity == "bias":
         return at.S.T @ model.bias(at)
     if quantity == "acceleration":
-        return np.linalg.solve(at.S, model.acceleration(at, at.force(force)) - at.c)
-    return np.array(
-        [at.S.T @ by @ at.S for by in model.derivatives(at, at.force(force))]
-    )  # S is a permutation
+        return np.linalg.solve(at.S, model.acceleration(at, own_force) - at.c)
+    return np.array([at.S.T @ by @ at.S for by in model.derivatives(at, own_force)])  # S is a permutation
 
 
 def seconds_of_derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> float:

@@ -51,12 +51,8 @@ class OtherNames(EngineError):
     """An engine gives a joint another name, by which this program does not find it."""
 
 
-class Unasked(EngineError):
-    """This program does not ask an engine about such a robot: a limit of its module here, not of the engine."""
-
-
 class Unwritten(EngineError):
-    """A URDF cannot have what the robot has; the engine was not asked."""
+    """This program cannot write a URDF of the robot for the engine, which was not asked."""
 
 
 class TooLong(EngineError):

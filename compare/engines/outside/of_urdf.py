@@ -29,15 +29,11 @@ class OfUrdf(SteppedModel):
             raise Unwritten(str(error)) from None
         self.file, nv = file, file.coordinates.nv
         self.load(text)
-        self.read = {"armature": np.zeros(nv), "damping": self.damping(), "stiffness": np.zeros(nv)}
+        self.read = {"armature": np.zeros(nv), "stiffness": np.zeros(nv)}
 
     @abstractmethod
     def load(self, text: str) -> None:
         """Read the text."""
-
-    @abstractmethod
-    def damping(self) -> Array:
-        """Of the joints, as read, in the Tree's order, (nv,)."""
 
     @abstractmethod
     def gravity(self) -> Array: ...
@@ -46,9 +42,10 @@ class OfUrdf(SteppedModel):
     def set_gravity(self, gravity: Array) -> None: ...
 
     def other_force(self, q: Array, v: Array) -> Array:
-        """Of springs."""
-        first = self.file.coordinates.places.first_positions
-        return np.asarray(self.read["stiffness"] * (self.stated["rest"] - q)[first])
+        """Of springs, and of the damping of free joints."""
+        first, damping = self.file.coordinates.places.first_positions, self.stated["damping"]
+        springs = self.read["stiffness"] * (self.stated["rest"] - q)[first]
+        return np.asarray(springs - damping * v * self.order.is_of_free())
 
     def fields(self) -> Numbers:
         return {"gravity": self.gravity(), **self.read}

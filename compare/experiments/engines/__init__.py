@@ -13,7 +13,7 @@ from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
-from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unasked, Unread, Unwritten
+from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unread, Unwritten
 from ...engines.outside.model import FROM_URDF
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
@@ -32,16 +32,8 @@ EXPERIMENT = Experiment(order=65, serves_own=False, quick_speeds=0, options=("--
 BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
 TABLES = "answer", "read", "methods", "servos", "batches"
-SHOWN = ["engine", "quantity", "unit", "states", "as_read_over_bar", "worst_difference", "bar", "difference_over_bar",
-         "difference_eps", "mujoco_eps"]  # fmt: skip
-NOT_ASKED = (
-    Unread,
-    OtherJoints,
-    OtherNames,
-    Unasked,
-    Unwritten,
-    TooLong,
-)  # their names are kinds in the template
+# their names are kinds in the template
+NOT_ASKED = Unread, OtherJoints, OtherNames, Unwritten, TooLong
 
 
 def skipped(robot: Robot) -> Finding | None:
@@ -52,7 +44,7 @@ def skipped(robot: Robot) -> Finding | None:
 
 def rows(setup: Setup) -> EnginesResult:
     """What each installed engine has read, its M, h and accelerations, its integrators, servos and batches."""
-    result = EnginesResult("engines", shown=SHOWN, tables={f"engines_{name}": [] for name in TABLES})
+    result = EnginesResult("engines", tables={f"engines_{name}": [] for name in TABLES})
     absent: dict[str, list[str]] = {}
     others = [engine for engine in setup.engines.values() if isinstance(engine, Outside)]
     for engine in others:
