@@ -38,7 +38,10 @@ class Model(OfUrdf):
         never = self.world.getDeactivationOptions()
         never.mEnabled = False
         self.world.setDeactivationOptions(never)
-        starts, self.dampers = {}, dict[int, Any]()  # the latter by their places in q and v
+        starts, self.dampers = (
+            dict[int, tuple[int, int]](),
+            dict[int, Any](),
+        )  # the latter by their places in q and v
         for k, name in enumerate(self.file.names):
             is_free = self.file.is_free(k)
             joint = self.skeleton.getJoint(name.removesuffix(" turn") if is_free else name)

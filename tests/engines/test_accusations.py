@@ -1,10 +1,9 @@
 """Whatever is said of another engine is confirmed by a script that asks that engine directly, and is said of no other engine."""
 
-import struct
-
 import mujoco
 import numpy as np
 import pytest
+from files import STL
 
 import tmt
 from compare.engines import RECORDS
@@ -30,8 +29,6 @@ SMALL = """<mujoco model="m"><worldbody><body name="b"><joint name="j" axis="0 1
 <inertial pos="0 0 0" mass="1e-3" diaginertia="1e-11 1e-11 1e-11"/></body></worldbody></mujoco>"""
 DEFAULTS = """<default><joint damping="0.3" axis="0 1 0"/><default class="leg"><geom density="500"/></default></default>"""
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 4 3\nf 1 2 4\nf 2 3 4\n"
-FACES = (0, 2, 1), (0, 3, 2), (0, 1, 3), (1, 2, 3)
-CORNERS = np.vstack([np.zeros(3), np.eye(3)]).astype("f4")
 
 
 def drake(path):
@@ -131,8 +128,7 @@ def file_of(folder, text):
     path = folder / "robot.xml"
     path.write_text(text)
     (folder / "m.obj").write_text(TETRAHEDRON)
-    faces = [struct.pack("<12fH", 0, 0, 0, *CORNERS[list(face)].ravel(), 0) for face in FACES]
-    (folder / "m.stl").write_bytes(struct.pack("<80sI", b"", len(faces)) + b"".join(faces))
+    (folder / "m.stl").write_bytes(STL)
     return path
 
 

@@ -1,11 +1,11 @@
 """Files for engines that read them: URDF, includes and names; the URDF text of a compiled model; what acts in Drake's runs."""
 
-import struct
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from files import STL
 from models import PATHS, random_tree
 
 import tmt
@@ -33,8 +33,6 @@ PART = """<mujocoinclude><body name="arm"><joint name="hip" axis="0 1 0" damping
 WHOLE = """<mujoco><worldbody><include file="part.xml"/></worldbody><keyframe><key qpos="1 2"/></keyframe></mujoco>"""
 FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
 <inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/></body></worldbody></mujoco>"""
-FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
-STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
 MESHES = """<mujoco><compiler meshdir="parts"/>
 <default><default class="drawn"><geom type="mesh" mesh="m"/></default></default>
 <asset><mesh name="m" file="m.stl"/></asset><worldbody>
@@ -71,7 +69,7 @@ def test_a_urdf_and_files_with_an_include_and_with_meshes(engine, name, text, tm
     """A body whose mass is a mesh's, by its class, has the inertia that MuJoCo has computed."""
     (tmp_path / "part.xml").write_text(PART)
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "m.stl").write_bytes(struct.pack("<80sI", b"", 4) + b"".join(STL))
+    (tmp_path / "parts" / "m.stl").write_bytes(STL)
     robot = robot_of(tmp_path / name, text, floating=name == "floating.urdf")
     of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
     q = robot.coordinates.random(rng, 3)

@@ -17,7 +17,7 @@ from trees import tree_of_kinds
 from compare import engines
 from compare.core.check import About, Result
 from compare.engines import EngineRecord
-from compare.engines.outside.bodies import combined, links_of, numbers_of, size_of
+from compare.engines.outside.bodies import Body, combined, links_of, numbers_of, size_of
 from compare.engines.outside.file import File
 from compare.engines.outside.model import FROM_FILE, ReadModel
 from compare.engines.outside.order import Order
@@ -290,7 +290,7 @@ def test_axes_anchors_and_masses_are_those_by_which_the_bodies_move(number):
 
 def test_bodies_that_move_as_one():
     """Two points of 1 kg at 1 m from each other: 2 kg, and moments 0, 1/2, 1/2 kg m2 about their centre."""
-    mass, _, inertia = combined([(1.0, np.array([0.0, 0.0, z]), np.zeros((3, 3))) for z in (1.0, 2.0)])
+    mass, _, inertia = combined([Body(1.0, np.array([0.0, 0.0, z]), np.zeros((3, 3))) for z in (1.0, 2.0)])
     assert mass == 2.0 and np.linalg.eigvalsh(inertia) == pytest.approx([0.0, 0.5, 0.5])
     with_armature = dataclasses.replace(ARM.tree, armature=[0.1, 0.2, 0.3])
     assert numbers_of(with_armature)["armature"] == pytest.approx([0.1, 0.2, 0.3])

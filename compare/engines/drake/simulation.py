@@ -45,7 +45,7 @@ class Simulation:
 
         def set_force(context: Any, output: Any) -> None:
             state = forces.get_input_port().Eval(context)
-            q, v = self.in_tree(state[:nq], state[nq:])
+            q, v = order.tree_state(state[:nq], state[nq:])
             output.SetFromVector(order.state(q).force(course.force(q, v)))
 
         forces, builder = LeafSystem(), DiagramBuilder()
@@ -56,11 +56,6 @@ class Simulation:
         builder.Connect(self.plant.get_state_output_port(), forces.get_input_port())
         builder.Connect(forces.get_output_port(), self.plant.get_applied_generalized_force_input_port())
         return builder.Build()
-
-    def in_tree(self, x: Array, u: Array) -> tuple[Array, Array]:
-        """q and v of the Tree."""
-        q = self.order.tree_positions(x)
-        return q, self.order.tree_speeds(q, u)
 
     def run(self, course: Course) -> tuple[Array, int]:
         """See ReadModel.run."""
@@ -76,7 +71,7 @@ class Simulation:
                 self.simulator.AdvanceTo(t - 0.5 * course.dt if is_discrete else t)
             except RuntimeError:  # it finds no step, or no solution of its equations
                 break
-            reached = self.in_tree(plant.GetPositions(context), plant.GetVelocities(context))
+            reached = self.order.tree_state(plant.GetPositions(context), plant.GetVelocities(context))
             states.append(np.concatenate(reached))
         evaluations = self.simulator.get_integrator().get_num_derivative_evaluations()
         return np.array(states), course.steps if is_discrete else evaluations

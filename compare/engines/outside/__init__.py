@@ -158,13 +158,11 @@ class OutsideDynamics(OneByOne):
         self.seconds_prepared, step_alone = self.ask(answers.prepared, course)
         alone = None if step_alone is None else step_alone * course.steps
 
-        def run() -> answers.Run:
+        def run() -> Motion:
             return self.ask(answers.ran, course)
 
-        def read(run: answers.Run) -> Motion:
-            motion, steps = course.motion(run.states, run.why), course.steps or None
-            motion = motion._replace(evaluations=run.evaluations, seconds=run.seconds, steps=steps)
-            return motion._replace(seconds_alone=alone)
+        def read(motion: Motion) -> Motion:
+            return motion._replace(steps=course.steps or None, seconds_alone=alone)
 
         return run, read
 

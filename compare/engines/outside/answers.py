@@ -4,7 +4,7 @@ import importlib
 import time
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ...core import timing
 from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
-from .. import RECORDS, Array, Course
+from .. import RECORDS, Array, Course, Motion
 from .bodies import numbers_of, size_of
 from .file import EngineError, File, Unread
 from .model import ReadModel
@@ -22,13 +22,6 @@ from .model import ReadModel
 CALLS = 50  # at most, that are timed
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 T = TypeVar("T")
-
-
-class Run(NamedTuple):
-    states: Array  # (times, nq + nv)
-    evaluations: int | None
-    seconds: float  # of the run alone
-    why: str  # why it may have ended early
 
 
 def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, is_set: bool, *arguments: Any) -> T:
@@ -126,11 +119,12 @@ def batched(model: ReadModel, course: Course) -> tuple[float, float, str, np.nda
     return seconds, timing.fastest({"": run}, 5)[""], device, q
 
 
-def ran(model: ReadModel, course: Course) -> Run:
+def ran(model: ReadModel, course: Course) -> Motion:
     begin, why = time.perf_counter(), "a number is not finite"
     states, evaluations = course.start[None], None
     try:
         states, evaluations = model.run(course)
     except ArithmeticError as error:  # it cannot go on
         why = str(error)
-    return Run(np.asarray(states, float), evaluations, time.perf_counter() - begin, why)
+    motion = course.motion(np.asarray(states, float), why)
+    return motion._replace(evaluations=evaluations, seconds=time.perf_counter() - begin)

@@ -1,6 +1,6 @@
 """The numbers of bodies and joints: those of a Tree, and those that follow from an engine's links, in the same shapes."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -131,9 +131,8 @@ def movement(before: Sequence[Link], after: Sequence[Link]) -> tuple[Array, Arra
     return np.eye(3), np.zeros(3)
 
 
-def combined(bodies: Iterable[tuple[float, Array, Array]]) -> Body:
+def combined(parts: Sequence[Body]) -> Body:
     """Bodies that move as one, with the inertia about their common centre of mass; of no bodies: 0."""
-    parts = [Body(*body) for body in bodies]
     mass, tensor = sum((body.mass for body in parts), 0.0), np.zeros((3, 3))
     centre = sum((body.mass * body.com for body in parts), np.zeros(3)) / (mass or 1.0)
     for m, com, inertia in parts:

@@ -222,9 +222,7 @@ class SteppedModel(ReadModel):
         for step in range(1, course.steps + 1):
             self.set_force(at.force(course.force(q, v) + self.other_force(q, v)))
             self.step()
-            x, u = self.reached()
-            q = self.order.tree_positions(x)
-            v = self.order.tree_speeds(q, u)
+            q, v = self.order.tree_state(*self.reached())
             at = self.order.state(q, v)
             if step % course.every == 0:
                 states.append(np.concatenate([q, v]))

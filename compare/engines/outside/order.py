@@ -122,21 +122,19 @@ class Order:
             x[part] = code.encode(moved[place])
         return x
 
-    def tree_positions(self, x: Array) -> Array:
+    def tree_state(self, x: Array, u: Array) -> tuple[Array, Array]:
+        """q and v of the Tree."""
         q = np.empty(self.file.coordinates.nq)
         for place, part, code in self.parts:
             q[place] = code.decode(x[part])
-        return q + self.reference
+        q += self.reference
+        return q, np.linalg.solve(self.speeds_at(q)[0], u)
 
     def tree_numbers(self, values: Array) -> Array:
         """Numbers of the engine's speeds, (nv,) or (nv, nv), in the Tree's order; axes are left as they are."""
         placed = np.empty_like(values)
         placed[np.ix_(*[self.v] * values.ndim)] = values
         return placed
-
-    def tree_speeds(self, q: Array, u: Array) -> Array:
-        S, _ = self.speeds_at(q)
-        return np.asarray(np.linalg.solve(S, u))
 
     def state(self, q: Array, v: Array | None = None) -> State:
         """A state; at rest by default."""
