@@ -1,6 +1,7 @@
 """MJCF with all of its includes in one text, for engines that cannot read them or need names."""
 
 from collections.abc import Callable, Iterator
+from itertools import compress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TypeVar
@@ -69,19 +70,17 @@ def is_from_file(part: ElementTree.Element) -> bool:
 
 def take_meshes_away(bodies: list[ElementTree.Element], path: Path) -> None:
     """Remove geoms that are meshes, by their class too; their bodies get the inertia that MuJoCo has computed, in float32."""
-    import mujoco
-
     from ..mujoco.source import Source
 
     source = Source(path)
-    model, compiled = source.model, list(source.spec.bodies)[1:] if source.spec else []  # without the world
-    if not model.nbody - 1 == len(compiled) == len(bodies):
+    model, mesh_geoms = source.model, source.mesh_geoms
+    if not model.nbody - 1 == len(mesh_geoms) == len(bodies):
         raise Unread("its bodies are not all in the text")
-    for number, (body, of_spec) in enumerate(zip(bodies, compiled), start=1):
+    for number, (body, (_, are_meshes)) in enumerate(zip(bodies, mesh_geoms), start=1):
         geoms = list(geoms_in(body))
-        if len(geoms) != len(of_spec.geoms):
-            raise Unread("its geoms are not all in the text")
-        meshes = [pair for pair, geom in zip(geoms, of_spec.geoms) if geom.type == mujoco.mjtGeom.mjGEOM_MESH]
+        if len(geoms) != len(are_meshes):  # MuJoCo was asked without meshes whose files are missing
+            are_meshes = [is_from_file(geom) for _, geom in geoms]
+        meshes = list(compress(geoms, are_meshes))
         for parent, geom in meshes:
             parent.remove(geom)
         if meshes and body.find("inertial") is None:

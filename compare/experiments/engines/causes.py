@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -39,10 +38,8 @@ class Text:
 
     def __init__(self, file: File) -> None:
         source, path = Source(file.path, file.floating), file.path
-        self.model, self.meshed = source.model, set[str]()  # the names of bodies with geoms that are meshes
-        for body in source.spec.bodies if source.spec else ():
-            if any(geom.type == mujoco.mjtGeom.mjGEOM_MESH for geom in body.geoms):
-                self.meshed.add(body.name)
+        self.model = source.model
+        self.meshed = {name for name, are_meshes in source.mesh_geoms if any(are_meshes)}  # of bodies
         self.places = joint_places(self.model)
         self.root = ElementTree.Element("mujoco")
         if path.suffix != ".urdf":
