@@ -220,12 +220,8 @@ def test_masses_and_a_gravity_that_were_read_otherwise_are_set(engine, tmp_path)
 
 
 BALL = ARM.format("", '<joint name="j" type="ball"/>', "")
-FREE = ARM.format("", '<joint name="j" type="free"/>', "")
-
-
-BESIDE = FREE.replace(
-    "</worldbody>", f'<body><joint axis="0 1 0"/>{INERTIAL.format("0 0 1")}</body></worldbody>'
-)
+BESIDE = f"""<mujoco><worldbody><body><freejoint name="f"/>{INERTIAL.format("0 0 1")}</body>
+<body>{HINGE}{INERTIAL.format("0 0 1")}</body></worldbody></mujoco>"""
 
 
 def test_a_limit_of_this_program_is_said_as_such(tmp_path):
@@ -244,14 +240,13 @@ def test_pybullet_takes_angles_of_a_quaternion_about_the_bodys_own_axes(tmp_path
     from scipy.spatial.transform import Rotation
 
     pybullet.connect(pybullet.DIRECT)
-    (tmp_path / "b.urdf").write_text(
-        '<robot name="r"><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>'
-    )
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    (tmp_path / "b.urdf").write_text(f'<robot name="r"><link name="b">{inertial}</link></robot>')
     body = pybullet.loadURDF(str(tmp_path / "b.urdf"))
     pybullet.setGravity(0, 0, -9.81)
-    turn = Rotation.from_euler("XYZ", [0.4, 0.5, 0.6])
-    for quaternion, is_right in ((turn, False), (Rotation.from_euler("xyz", [0.4, 0.5, 0.6]), True)):
+    turn, converted = (Rotation.from_euler(axes, [0.4, 0.5, 0.6]) for axes in ("XYZ", "xyz"))
+    for quaternion, is_right in ((turn, False), (converted, True)):
         state = [0.0, 0.0, 0.0, *quaternion.as_quat()], [0.0] * 6, [0.0] * 6
-        force = np.array(pybullet.calculateInverseDynamics(body, *state))[:3]  # linear first
+        force = pybullet.calculateInverseDynamics(body, *state)[:3]  # linear first
         assert np.allclose(force, turn.inv().apply([0.0, 0.0, 9.81])) == is_right
     pybullet.disconnect()

@@ -128,7 +128,7 @@ class Order:
         for place, part, code in self.parts:
             q[place] = code.decode(x[part])
         q += self.reference
-        return q, np.linalg.solve(self.speeds_at(q)[0], u)
+        return q, np.linalg.solve(self.state(q).S, u)
 
     def tree_numbers(self, values: Array) -> Array:
         """Numbers of the engine's speeds, (nv,) or (nv, nv), in the Tree's order; axes are left as they are."""
@@ -139,11 +139,6 @@ class Order:
     def state(self, q: Array, v: Array | None = None) -> State:
         """A state; at rest by default."""
         v = np.zeros(self.file.coordinates.nv) if v is None else v
-        S, c = self.speeds_at(q, v)
-        return State(self.engine_positions(q), S @ v, S, c)
-
-    def speeds_at(self, q: Array, v: Array | None = None) -> tuple[Array, Array]:
-        """S and c at a state."""
         S, c = np.zeros((len(self.v),) * 2), np.zeros(len(self.v))
         S[np.arange(len(self.v)), self.v] = 1.0
         for k, (_, start) in self.starts.items():
@@ -162,9 +157,8 @@ class Order:
             point = R @ self.points.get(k, np.zeros(3))
             S[linear, of_origin] = in_linear
             S[linear, joint.qd] = in_linear @ np.cross(R, point[:, None], axis=0)
-            if v is not None:
-                w = R @ v[joint.qd]
-                c[linear] = in_linear @ np.cross(w, np.cross(w, point))
-                if not self.linear_in_world:  # the axes turn
-                    c[linear] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
-        return S, c
+            w = R @ v[joint.qd]
+            c[linear] = in_linear @ np.cross(w, np.cross(w, point))
+            if not self.linear_in_world:  # the axes turn
+                c[linear] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
+        return State(self.engine_positions(q), S @ v, S, c)
