@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, Course, EngineRecord
+from . import Array, EngineRecord
 from .outside.bodies import Body, Link, Numbers
 from .outside.file import EngineError, File, OtherJoints
 from .outside.model import SteppedModel
@@ -163,9 +163,6 @@ class Model(SteppedModel):
         forces = {"gravity_force": weight, "coriolis_force": rest}
         self.newton.eval_inverse_dynamics_passive(self.model, self.state, **forces)
         return np.asarray(weight.numpy().astype(float) + rest.numpy() + M @ at.c)
-
-    def prepare(self, course: Course) -> None:
-        self.set_passive(course.method)
 
     def set_passive(self, method: str | None) -> None:
         """Give a method the damping and stiffness that act in it; None: none."""

@@ -46,8 +46,10 @@ class Model(ReadModel):
             parts = joint.extract().joints if joint.shortname() == "JointModelComposite" else [joint]
             name = self.model.names[number].removeprefix("Composite_")
             # one without a name is called by its body here, and as MuJoCo numbers it there
-            k = self.number_of(f"{next(free, name)} turn" if joint.shortname() == FREE else name)
-            q, v = joint.idx_q, joint.idx_v
+            name = f"{next(free, name)} turn" if joint.shortname() == FREE else name
+            if name not in self.file.names:
+                raise OtherNames(f"the file has no joint {name!r}")
+            q, v, k = joint.idx_q, joint.idx_v, self.file.names.index(name)
             for part in parts:
                 is_free, self.last[number] = part.nv == 6, k
                 starts |= of_free(k, (q, v), (q + 3, v + 3)) if is_free else {k: (q, v)}
@@ -56,11 +58,6 @@ class Model(ReadModel):
         if self.model.nv != self.file.coordinates.nv:
             raise OtherJoints(f"it has {self.model.nv} speeds, the file {self.file.coordinates.nv}")
         self.order = Order(self.file, starts, XYZW, XYZW, linear_in_world=False, circles=tuple(circles))
-
-    def number_of(self, name: str) -> int:
-        if name not in self.file.names:
-            raise OtherNames(f"the file has no joint {name!r}")
-        return self.file.names.index(name)
 
     @property
     def quantities(self) -> tuple[str, ...]:

@@ -166,15 +166,17 @@ def test_without_an_extra_mujoco_and_tmt_are_compared(mujoco, monkeypatch):
 
 
 def test_a_cause_is_named_where_the_engine_has_what_follows_from_it(tmp_path):
-    """A gravity that was ignored; another one is not explained by that."""
+    """A gravity that was ignored; another one is not explained by that. Other joints are no refusal."""
     path = tmp_path / "robot.xml"
     path.write_text(LEG.replace("<worldbody>", '<option gravity="1 2 -3"/><worldbody>'))
-    robot, kinds = compared_with("model", str(path)).robot, []
+    robot, named = compared_with("model", str(path)).robot, []
     stated = numbers_of(robot.tree)
-    for gravity in ((0.0, 0.0, -9.81), (1.0, 2.0, 3.0)):
-        reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": None,
+    copied = ("Refused", ""), ("OtherJoints", "")
+    for gravity, why in zip(((0.0, 0.0, -9.81), (1.0, 2.0, 3.0)), copied):
+        reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": why,
                    "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
         result = EnginesResult("engines", tables={"engines_read": []})
         compare_numbers(result, robot, RECORDS["drake"], reading)
-        kinds.append({row.cause for row in result.tables["engines_read"]})
-    assert kinds == [{"option_gravity gravity"}, {None}]
+        (cause,) = {row.cause for row in result.tables["engines_read"]}
+        named.append((cause, result.readers["Drake"].differing))
+    assert named == [("option_gravity gravity", ["refused", "gravity"]), (None, ["joints", "gravity"])]

@@ -9,7 +9,8 @@ from ...core.check import About
 from ...core.words import some_of
 from ...engines import EngineRecord
 from ...engines.outside.bodies import size_of
-from ...engines.outside.file import File, OtherNames
+from ...engines.outside.file import File, OtherJoints
+from ...engines.outside.mjcf_text import REFUSED
 from ...engines.outside.model import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
@@ -26,7 +27,8 @@ FOLLOWS = {
     "inertia": ("moments", "mass"), "com": ("mass",), "axis_moved": ("axis",), "anchor_moved": ("anchor", "axis"),
     "com_moved": ("com", "axis", "anchor", "mass"),
 }  # fmt: skip
-REFUSED = "refused"  # in place of a number: the file itself
+# in place of a number, by the kind of error for which a copy was read: the file itself, or its joints
+OF_COPIES = {REFUSED: ["refused"], OtherJoints.__name__: ["joints"]}
 AS_READ = "as read"  # checks of numbers
 
 
@@ -37,7 +39,7 @@ def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, r
     if reading["copied"]:
         kind, message = reading["copied"]
         result.find("copied", engine=label, error=kind, reason=message.rstrip("."))
-        share.differing += [REFUSED] if kind != OtherNames.__name__ else []
+        share.differing += OF_COPIES.get(kind, [])
     if lacking:
         result.find("lacking", engine=label, numbers=lacking)
         share.differing += [f"no {number}" for number in lacking]
