@@ -17,7 +17,7 @@ from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
 from ...engines.outside import OutsideDynamics
-from ...engines.outside.model import EngineError
+from ...engines.outside.file import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...stability.closed_form import COVERED, matrix
@@ -118,7 +118,7 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
         forward.rows.append(row)
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]
-        result.times[quantity.name, LABELS[name]] = dynamics.seconds("derivatives", *state)
+        result.times[quantity.name, LABELS[name]] = dynamics.seconds_of_derivatives(*state)
 
 
 def has_derivatives(dynamics: OutsideDynamics) -> bool:
