@@ -1,7 +1,7 @@
 """Edits of the step of a file at rest: its derivative, closed form, limits, runs, programs, motions, cures."""
 
 EDITS = (
-    ("mujoco.step", "shared", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
+    ("mujoco.step", "options_of", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
     ("mujoco.step", "Step.run_program", "(step - delay) // period", "step // period", "a delay delays nothing"),
     ("mujoco.step", "Step.relaxed", "1.0 - rate * self.dt", "1.0", "a relaxed run is not damped"),
     ("mujoco.forces", "rows", "m.opt.cone == _1 and size > 1", "False", "pyramids have as many rows as ellipses"),
