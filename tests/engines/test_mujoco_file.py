@@ -32,7 +32,10 @@ ASSETS = f"""<asset><texture name="t" type="2d" builtin="flat" width="{PIXELS}" 
 <material name="m" texture="t"/></asset>"""
 ALONG = '<actuator><general name="a" tendon="t" armature="1"/></actuator>'
 BALL = '<body><joint type="ball" name="w"/><geom size="0.1"/><body><joint name="w x"/><geom size="0.1"/></body></body>'
+FUSED = '<compiler fusestatic="true" inertiafromgeom="true"/>'
+LINK = f'<body name="c" pos="0.5 0 0">{STATED}</body>'
 REFUSED = {  # a word of why, and the file
+    "leaves out the <inertial>": mjcf(PLAIN.replace("</body>", f"{LINK}</body>"), FUSED),
     "tendon 't'": mjcf(TWO, after=TENDON.format('armature="1"')),
     "actuator 'a'": mjcf(TWO, after=TENDON.format("") + ALONG),
     "flex 'soft'": mjcf(PLAIN + '<flexcomp name="soft" type="grid" count="2 2 2" spacing=".1 .1 .1" dim="3" mass="1">'
@@ -122,6 +125,13 @@ def test_the_model_that_is_read_is_small_and_has_its_contacts():
     assert mujoco.mj_sizeModel(mujoco.MjModel.from_xml_string(text)) > 3 * PIXELS**2
     assert mujoco.mj_sizeModel(reading.model) < 1e5 and len(pickle.dumps(reading)) < 2e5
     assert reading.model.ngeom == 5
+
+
+def test_what_never_moves_has_its_part_of_a_total_mass():
+    mesh = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+    still = '<body><geom type="mesh" mesh="m"/></body>'
+    source = Source(mjcf(PLAIN + still, f'<compiler settotalmass="3"/>{mesh}'))
+    assert source.without_meshes().body("b").mass == source.model.body("b").mass < 3.0
 
 
 @pytest.mark.parametrize("why", REFUSED)

@@ -8,7 +8,7 @@ import pytest
 from files import PLAIN, TENDON, TWO, URDF, assert_the_same, case_of, mjcf
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import KINDS, PATHS, gymnasium_files, random_tree
+from models import KINDS, PATHS, gymnasium_files, random_tree, with_features
 from trees import random_state
 
 from compare.engines.mujoco import ModelError, Source, engine, read
@@ -28,14 +28,17 @@ OF_MIXED = [*KINDS, "armature", "damping", "spring", "limit", "clamp", "actuator
 LIGHT = PLAIN.replace('name="b"', 'name="b" gravcomp="1"').replace('name="j"', 'name="j" axis="0 1 0"')
 MOTORS = '<actuator><motor name="a" joint="j"/><motor name="b" joint="j" forcerange="-1 1"/></actuator>'
 EQUALITIES = '<equality><weld body1="c"/><joint joint1="j" joint2="k" active="false"/></equality>'
+WALLS = """<geom name="floor" type="plane" size="1 1 1"/><geom name="wall" size="1" contype="0" conaffinity="0"/>
+<geom name="picture" size="1" contype="0" conaffinity="0"/>"""
+KEYS = '<keyframe><key name="up" qpos="inf"/><key name="pushed" ctrl="inf 0"/><key qpos="1"/></keyframe>'
 MORE = {  # feature: file, names
-    "contact": (mjcf(PLAIN + '<geom name="floor" type="plane" size="1 1 1"/>'), ("floor", "g")),
+    "contact": (mjcf(PLAIN + WALLS, after='<contact><pair geom1="wall" geom2="g"/></contact>'), ("floor", "wall", "g")),
     "armature": (mjcf(after='<actuator><general name="a" joint="j" gear="2" armature="1"/></actuator>'), ("a",)),
     "frictionloss": (mjcf(PLAIN.replace('name="j"', 'name="j" frictionloss="1"')), ("j",)),
     "clamp": (mjcf(PLAIN.replace('name="j"', 'name="j" actuatorfrcrange="-1 1"'), after=MOTORS), ("b", "j")),
     "fluid": (mjcf(before='<option density="1000" viscosity="0.1" wind="3 0 0"/>'), ("density", "viscosity")),
     "gravcomp": (mjcf(LIGHT), ("b",)), "equality": (mjcf(TWO, after=EQUALITIES), ("equality 0",)),
-    "unusable keyframe": (mjcf(after='<keyframe><key name="up" qpos="inf"/><key qpos="1"/></keyframe>'), ("up",)),
+    "unusable keyframe": (mjcf(after=MOTORS + KEYS), ("up", "pushed")),
     "tendon": (mjcf(TWO, after=TENDON.format('stiffness="9" damping="3" springlength="0.3" range="0 1"')), ("t",)),
 }  # fmt: skip
 OTHERS = {  # what is listed as other: a joint and an option of the file, and the joint of a file without
@@ -101,7 +104,20 @@ def test_a_file_with_every_kind_of_joint():
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
-    compared(random_tree(seed, kinds, joints), np.random.default_rng(seed))
+    """And MuJoCo's own mass matrix and bias are the same, whatever else the file has on."""
+    text, rng = with_features(random_tree(seed, kinds, joints), seed), np.random.default_rng(seed)
+    reading, model = compared(text, rng), mujoco.MjModel.from_xml_string(text)
+    dynamics, data, M = (
+        engine(reading).of(case_of(reading.tree)),
+        mujoco.MjData(model),
+        np.zeros((model.nv, model.nv)),
+    )
+    q, v, _ = random_state(rng, reading.tree)
+    data.qpos[dynamics.qpos], data.qvel[dynamics.dofs] = q, v
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, M)
+    for found, expected in ((M, dynamics.mass_matrix(q)), (data.qfrc_bias, dynamics.bias(q, v))):
+        assert np.allclose(found[np.ix_(*[dynamics.dofs] * found.ndim)], expected, rtol=1e-10, atol=1e-10)
 
 
 @pytest.mark.parametrize("source", [PATHS["mixed"], random_tree(0), URDF], ids=["mixed", "random", "URDF"])
@@ -181,7 +197,9 @@ def test_a_joint_alone_and_left_alone(name, rng):
 
 @pytest.mark.parametrize("parts", [["x", "z"], ["y", "turn"], ["x", "y", "z"], ["x", "y", "z", "turn"]])
 def test_parts_of_a_free_joint_and_others(parts, rng):
-    assert_locked(read(PATHS["mixed"]), [f"base {part}" for part in parts] + ["joint 2", "tail"], rng)
+    heavy = '<joint name="base" type="free" armature="0.1"/>'
+    text = PATHS["mixed"].read_text(encoding="utf-8").replace('<freejoint name="base"/>', heavy)
+    assert_locked(read(text), [f"base {part}" for part in parts] + ["joint 2", "tail"], rng)
 
 
 def test_the_only_joint_of_a_file_may_be_locked():
@@ -196,7 +214,8 @@ def test_what_refers_to_a_locked_joint_goes_too(rng):
         '<actuator><position joint="j" kp="9"/><motor tendon="t"/><general joint="k" armature="0.3" gear="2"/></actuator>'
         '<custom><tuple name="u"><element objtype="joint" objname="j"/></tuple></custom><keyframe><key qpos="1 2"/></keyframe>'
     )
-    reading = read(mjcf(TWO, after=more))
+    by_inertia = TWO.replace('name="j"', 'name="j" springdamper="1 0.5"')  # which k, locked aside, changes
+    reading = read(mjcf(by_inertia.replace('name="h"', 'name="h" pos="0.3 0 0"'), after=more))
     assert assert_locked(reading, ["j"], rng).model.nu == 1  # the one with armature
     assert_locked(reading, ["k"], rng)
 

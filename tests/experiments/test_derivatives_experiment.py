@@ -11,9 +11,10 @@ from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
 from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
-from compare.experiments.derivatives import contact_rows, subjects, ways
-from compare.experiments.derivatives.ways import DerivativeRow, best_of, worst_of_each_eps
+from compare.experiments.derivatives import contact_rows, of_mujoco, subjects, ways
+from compare.experiments.derivatives.ways import CostRow, DerivativeRow, best_of, worst_of_each_eps
 from compare.robots.arm import ARM
+from compare.robots.states import Sample
 
 DT = 0.01
 
@@ -23,13 +24,17 @@ def bent():
     return subjects.along(next(case for case in ARM.cases if case.name == "bent, damped"), 2)
 
 
-def shares(mujoco, subject, *integrators) -> dict[str, float]:
-    every = ways.measured(ways.Task(subject, integrators, False), mujoco, DT)
+def shares(mujoco, subject, *integrators, compiles=False) -> dict[str, float]:
+    every = ways.measured(ways.Task(subject, integrators, compiles), mujoco, DT)
     return {way: share for one in every for way, share in one.shares.items()}
 
 
 def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_derivatives_than_both(small):
-    values = small("derivatives").top[0].values
+    result = small("derivatives")
+    for row in result.tables["derivative_costs"]:
+        seconds = result.times.get((row.quantity, row.way))
+        assert row.time == (None if seconds is None else pytest.approx(1e6 * seconds))
+    values = result.top[0].values
     centred, usual = values["centred"], values["usual"]
     assert 1e-7 < centred.eps < 1e-3 and 1e-12 < centred.error < 1e-8 and usual.eps == 1e-6
     assert usual.error > 30 * centred.error and values["one_sided"].error > 10 * centred.error
@@ -53,23 +58,26 @@ def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
 
 def test_a_wrong_damper_is_seen_in_the_centred_differences(mujoco, bent):
     assert max(shares(mujoco, bent, "Euler", "RK4").values()) <= 1.0
-    damping = tuple(x + 1e-6 for x in bent.tree.damping)
+    damping = tuple(x + 1e-8 for x in bent.tree.damping)
     wrong = bent._replace(tree=dataclasses.replace(bent.tree, damping=damping))
     found = shares(mujoco, wrong, "implicitfast", "RK4")
     assert all(share > 1.0 for way, share in found.items() if way.endswith("centred"))
     assert found[ways.NUMPY] <= 1.0  # of its own model they are exact
 
 
-def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch):
-    by_numpy = ways.Quantity.by_numpy
+@pytest.mark.parametrize("way, owner, name", [
+    (ways.NUMPY, ways.Quantity, "by_numpy"), (ways.COMPILED, ways.Evaluator, "of_rows"),
+])  # fmt: skip
+def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch, way, owner, name):
+    right = getattr(owner, name)
 
     def wrong(self, *arguments):
-        values = by_numpy(self, *arguments)
-        values[0, 0, 1] += 1e-9
+        values = right(self, *arguments)
+        values.reshape(len(values), -1)[0, 1] += 1e-9
         return values
 
-    monkeypatch.setattr(ways.Quantity, "by_numpy", wrong)
-    assert shares(mujoco, bent, "Euler")[ways.NUMPY] > 1.0
+    monkeypatch.setattr(owner, name, wrong)
+    assert shares(mujoco, bent, "Euler", compiles=True)[way] > 1.0
 
 
 def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relative_to():
@@ -122,15 +130,18 @@ def test_rounding_is_carried_through_a_step_that_grows():
     assert step.rows[0].largest > 1e6 and max(step.shares.values()) <= 1.0
 
 
+def test_tmt_is_compared_with_mujocos_own_centred_function():
+    ways_to_it = "mjd, one-sided", "differences, centred", "mjd, centred", ways.COMPILED
+    costs = [
+        CostRow(quantity="A", way=way, best_eps=None, error=0.0, error_at_usual=None, time=1.0)
+        for way in ways_to_it
+    ]
+    assert of_mujoco(costs, "A") is costs[2] and of_mujoco(costs, "B") is None
+
+
 def test_where_differences_lose_digits_is_said(bent):
-    about = {
-        "quantity": "A and B, RK4",
-        "way": "a",
-        "eps": 1e-5,
-        "states": 1,
-        "unit": "rad per rad",
-        "largest": 1.0,
-    }
+    about = {"quantity": "A and B, RK4", "way": "a", "eps": 1e-5, "states": 1, "largest": 1.0}
+    about["unit"] = "rad per rad"
     rows = [DerivativeRow(subject="stiff servos", error=error, **about) for error in (1e-7, 9e-9, None, 1e-9)]
     said = [
         say(Finding("derivatives", "hard", {"pairs": [{"row": row, "scenes": rows[3]}]})) for row in rows[:3]
@@ -142,8 +153,19 @@ def test_where_differences_lose_digits_is_said(bent):
     assert "the same eps serves" in said[1] and "not finite" in said[2]
     finer = dataclasses.replace(rows[0], eps=1e-6)
     assert worst_of_each_eps(rows) == {1e-5: rows[2]} and best_of([*rows, finer]) is finer
+
+
+def test_hard_states_are_those_of_critical_dampers_and_of_the_least_definite_matrix(bent):
     stiff = subjects.stiff(bent, DT)
     assert min(stiff.tree.stiffness) > 1e3 * DT and stiff.q.shape == (1, 3)
+    assert stiff.tree.damping == pytest.approx(
+        DT * np.array(stiff.tree.stiffness)
+    )  # 2 / rate, the rate 2 / DT
+    M = tmt.mass_matrix(bent.q)
+    roots = np.sqrt(np.einsum("sii->si", M))
+    least = np.linalg.eigvalsh(M / (roots[:, :, None] * roots[:, None, :]))[:, 0]
+    (q,) = subjects.near_singular(bent, Sample(bent.tree, "", bent.q, bent.qd, bent.tau, 0)).q
+    assert np.array_equal(q, bent.q[least.argmin()]) and np.ptp(least) > 0.0
 
 
 FEET = "".join(
@@ -152,7 +174,7 @@ FEET = "".join(
 )
 TABLE = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbody>
 <geom name="floor" type="plane" size="1 1 1"/><body name="table" pos="0 0 0.02"><freejoint/>
-<inertial pos="0.02 0.03 0.05" mass="1" diaginertia="0.01 0.02 0.025"/>{FEET}
+<inertial pos="0.02 0.03 0.05" mass="1" diaginertia="0.01 0.02 0.025"/>{FEET}<geom name="knob" size="0.02" pos="0 0 0.002"/>
 </body></worldbody></mujoco>"""
 
 
@@ -161,6 +183,7 @@ def test_contacts_that_open_within_eps_are_named():
     rows = contact_rows(read(TABLE))
     fine, coarse = (next(row for row in rows if row.eps == eps) for eps in (1e-7, 1e-2))
     assert fine.contacts == 4 and fine.changed == "" and fine.difference < 1e-3
+    assert "floor and knob" in coarse.changed  # which the movement downwards closes
     assert "floor and foot0" in coarse.changed and not coarse.difference < 10 * fine.difference
     said = say(Finding("derivatives", "contacts", {"rows": rows}))
     assert "open or close (floor and foot" in said and "qpos0, where 4 pairs of geoms touch" in said

@@ -1,7 +1,7 @@
 """Which engine: servos, batches, times, the reference, the cheapest method, --engines."""
 
 import dataclasses
-from itertools import accumulate, chain, repeat
+from itertools import accumulate, chain, product, repeat
 
 import numpy as np
 import pytest
@@ -106,12 +106,7 @@ def test_batches_have_the_same_error_for_any_number_of_worlds(setup, monkeypatch
     for name in ("mujoco", "tmt"):
         batches.time_batches(result, setup, setup.engines[name])
     rows = result.tables["engines_batches"]
-    assert [(row.engine, row.worlds) for row in rows] == [
-        ("MuJoCo", 1),
-        ("MuJoCo", 5),
-        ("TMT", 1),
-        ("TMT", 5),
-    ]
+    assert [(row.engine, row.worlds) for row in rows] == [*product(("MuJoCo", "TMT"), (1, 5))]
     assert all(row.per_step_and_world > 0.0 and "CPU" in row.device for row in rows)
     assert np.ptp([row.worst_error for row in rows]) <= 1e-13 and 0.0 < rows[0].worst_error < 1e-4
 

@@ -3,9 +3,9 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from .made import KINDS, chain, random_tree
+from .made import KINDS, chain, random_tree, with_features
 
-__all__ = ["KINDS", "PATHS", "chain", "gymnasium_files", "random_tree"]
+__all__ = ["KINDS", "PATHS", "chain", "gymnasium_files", "random_tree", "with_features"]
 
 # the files of this folder by name; `parts` holds what some of them include
 PATHS = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.xml"))}

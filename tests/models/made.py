@@ -59,6 +59,42 @@ def random_tree(seed: int, kinds=KINDS, joints: int = 8) -> str:
     return mjcf_of(root)
 
 
+def with_features(text: str, seed: int) -> str:
+    """A text of random_tree with contacts, limits, friction, actuators, ties, springs of tendons, frames and options too."""
+    rng, root = np.random.default_rng(seed), ET.fromstring(text)
+    add_element(root, "compiler", angle="radian", eulerseq=rng.choice(["XYZ", "zyx"]), autolimits="true")
+    integrator, flag = (
+        rng.choice(["Euler", "RK4", "implicitfast"]),
+        rng.choice(["limit", "contact", "warmstart"]),
+    )
+    option = add_element(
+        root, "option", gravity=rng.uniform(-9, 9, 3), density=rng.choice([0, 1000]), integrator=integrator
+    )
+    add_element(option, "flag", **{flag: "disable"})
+    for body in [*root.iter("body")]:
+        body.set("gravcomp", str(rng.choice([0, 0.5])))
+        add_element(body, "geom", type="box", size=rng.uniform(0.05, 0.2, 3), euler=rng.uniform(-3, 3, 3))
+        for child in [child for child in body if child.tag == "body" and rng.random() < 0.3]:
+            frame = add_element(body, "frame", pos=rng.uniform(-0.3, 0.3, 3), euler=rng.uniform(-3, 3, 3))
+            body.remove(child)
+            frame.append(child)
+    actuators, ties, tendons = (ET.SubElement(root, tag) for tag in ("actuator", "equality", "tendon"))
+    for joint in [joint for joint in root.iter("joint") if joint.get("type") != "ball"]:
+        joint.set("range", "-0.5 0.7")
+        joint.set("frictionloss", str(rng.choice([0, 0.1])))
+        kind = {
+            "motor": {},
+            "position": {"kp": 9, "kv": 2},
+            "general": {"armature": 0.1, "gear": rng.uniform(1, 3)},
+        }
+        name = str(rng.choice([*kind]))
+        add_element(actuators, name, joint=joint.get("name"), **kind[name])
+        add_element(ties, "joint", joint1=joint.get("name"))
+        fixed = add_element(tendons, "fixed", stiffness=3, damping=0.5)
+        add_element(fixed, "joint", joint=joint.get("name"), coef=2)
+    return mjcf_of(root)
+
+
 def add_joint(body, name: str, kind: str, rng, across=None):
     """A joint in a body, and its axis (none of a ball or free joint); `across`: the axis to be at a right angle to."""
     if kind == "free":

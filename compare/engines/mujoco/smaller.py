@@ -13,7 +13,7 @@ from .changed import state_as_compiled
 from .locked import Positions, compiled_without
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Source
+from .source import Source, is_from_geoms
 from .variants import of_base
 from .welded import compiled
 
@@ -196,7 +196,7 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
         bodies = [mujoco.mj_name2id(fixed, mujoco.mjtObj.mjOBJ_BODY, name) for name in (tie.name1, tie.name2)]
         if min(bodies) >= 0 and len(set(fixed.body_weldid[bodies].tolist())) == 1:
             spec.delete(tie)
-    spec.compiler.fusestatic = True
+    spec.compiler.fusestatic = not is_from_geoms(spec)  # else inertials would be lost
     return Smaller(spec)
 
 

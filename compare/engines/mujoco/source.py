@@ -16,9 +16,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 import mujoco
+import numpy as np
 
 from ...process.parts import is_pipe, named_by
 from .locked import FROM_GEOMS, Positions, compiled_without, delete_meshes, gives_inertia
+from .names import moving
 from .welded import compiled, join, welded_bodies
 
 # by MuJoCo, of a mesh that is not there or in another format
@@ -29,6 +31,10 @@ ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "must have positive eigenvalues": "the order of fullinertia is xx, yy, zz, xy, xz, yz",
     "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
+LOST = (
+    'with fusestatic and inertiafromgeom="true" MuJoCo leaves out the <inertial> of bodies without joints; '
+    'expected fusestatic="false" or inertiafromgeom="auto"'
+)
 ROOT_ELEMENT = re.compile(r"(?:\ufeff|\s|<[?!][^>]*>)*<([A-Za-z][\w.:-]*)")
 
 
@@ -88,6 +94,11 @@ class Source:
             mujoco.mj_setCacheCapacity(cache, capacity)
         lines += [str(warning.message) for warning in caught]
         self.warnings = tuple(dict.fromkeys(" ".join(line.split()) for line in lines))
+        if self._spec.compiler.fusestatic and is_from_geoms(spec):
+            fused = spec.copy()
+            fused.compiler.fusestatic = True
+            if not np.isclose(moving_mass(compiled(fused)), moving_mass(self.model)):
+                raise ModelError(f"cannot compare {self}: {LOST}")
         # elements have their numbers in the model only once compiled
         self.bodies, self.joints = [body.id for body in spec.bodies], [joint.id for joint in spec.joints]
 
@@ -272,7 +283,15 @@ def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
     A medium pushes geoms that touch nothing, and they may have the mass: there they stay.
     """
     spec = stated.copy()
-    has_mass = any(body.compiler.inertiafromgeom == FROM_GEOMS for body in spec.bodies)
     spec.compiler.fusestatic = False  # fused bodies would only be renumbered
-    spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or has_mass)
+    spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or is_from_geoms(spec))
     return spec
+
+
+def is_from_geoms(spec: mujoco.MjSpec) -> bool:
+    """Whether geoms have the mass of some body, whatever its inertial says."""
+    return any(body.compiler.inertiafromgeom == FROM_GEOMS for body in spec.bodies)
+
+
+def moving_mass(model: mujoco.MjModel) -> float:
+    return float(model.body_mass[moving(model)].sum())
