@@ -166,7 +166,9 @@ class Tape:
         return arguments[:1] if operation == "item" else arguments
 
 
-RULES = {"+": Tape.add, "-": Tape.subtract, "*": Tape.multiply, "/": Tape.divide, "neg": Tape.negative}
+RULES: dict[str, Callable[..., "Expression"]] = {
+    "+": Tape.add, "-": Tape.subtract, "*": Tape.multiply, "/": Tape.divide, "neg": Tape.negative,
+}  # fmt: skip
 
 
 class Expression:

@@ -50,13 +50,6 @@ class Step:
         """Of a deviation."""
         return 2 * self.model.nv + self.model.na
 
-    def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in self.__dict__.items() if name != "data"}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.data = mujoco.MjData(self.model)
-
     def state(self) -> np.ndarray:
         """The state that the data have."""
         return state_of(self.model, self.data)
@@ -121,20 +114,14 @@ class Step:
         behind[first:] *= (act - nudge >= low)[:, None]
         return list(zip(ahead, behind))
 
-    def contacts(self) -> int:
-        """The number of contacts of the data."""
-        return int(self.data.ncon)
-
     def touching(self, state: np.ndarray, by: np.ndarray) -> set[str]:
         """The pairs of geoms whose contacts have forces at a state that is moved, and how many contacts each has."""
         self.put(state, by)
         mujoco.mj_forward(self.model, self.data)
         contacts = self.data.contact
         pairs = [tuple(pair) for pair in contacts.geom[contacts.efc_address >= 0].tolist()]
-        names = {
-            pair: " and ".join(element_name(self.model, "geom", geom) for geom in pair) for pair in pairs
-        }
-        return {f"{name} ({pairs.count(pair)})" for pair, name in names.items()}
+        names = [" and ".join(element_name(self.model, "geom", geom) for geom in pair) for pair in pairs]
+        return {f"{name} ({pairs.count(pair)})" for pair, name in zip(pairs, names)}
 
     def lengths(self) -> np.ndarray:
         """Of all outputs of the actuators at the data's state."""
@@ -230,11 +217,8 @@ def whole_run(
     squares = np.full(parts * count, np.nan)
     for k, data in enumerate(step.run(start, parts * count)):
         squares[k] = data.qvel @ data.qvel / model.nv
-    speeds, failed = (
-        np.sqrt(squares.reshape(parts, count).mean(axis=1)),
-        np.flatnonzero(~np.isfinite(squares)),
-    )
-    return WholeRun(speeds, float(failed[0] + 1) * dt if len(failed) else None)
+    speeds, failed = squares.reshape(parts, count).mean(axis=1), np.flatnonzero(~np.isfinite(squares))
+    return WholeRun(np.sqrt(speeds), float(failed[0] + 1) * dt if len(failed) else None)
 
 
 def start_of(

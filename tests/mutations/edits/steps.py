@@ -40,7 +40,7 @@ EDITS = (
     ("naming", "limiting", "taken > most", "taken < most", "the contact that takes least limits"),
     ("stability.answer", "StepLimitRow.longest", "min(_1, self.own_dt)", "_1", "the file's own run says nothing"),
     ("stability.answer", "limit_row", "limit(place.frictionless, *_1)", "limit(model, *_1)", "dry friction stays"),
-    ("stability.answer", "answer", "standing if contacts else _1", "standing", "in the air it stands"),
+    ("stability.answer", "answer", "place and not contacts", "False", "in the air it stands"),
     ("stability.place", "placed", "np.array(posture.q) if _1 else None", "None", "a posture in numbers is qpos0"),
     ("stability.place", "placed", "thrown or touches(*_1)", "thrown", "what bounces on its floor is in the air"),
     ("stability.place", "placed", "restless_objects(*_1) if contacts else _2", "_2", "what moves on beside it hides a robot"),
