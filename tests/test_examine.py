@@ -140,9 +140,7 @@ def plot(result, name):
     return name, Figure(), "A caption."
 
 
-def test_first_answers_come_first_and_timed_experiments_last_which_are_drawn_after_all_timings(
-    tmp_path, monkeypatch
-):
+def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp_path, monkeypatch):
     names, log = ["mass", "trajectory", "speed", "stability", "reduction"], []
 
     def rows(name, setup):
