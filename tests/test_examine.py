@@ -141,7 +141,7 @@ def plot(result, name):
 
 
 def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp_path, monkeypatch):
-    names, log = ["mass", "trajectory", "speed", "stability", "reduction"], []
+    names, log = ["mass", "trajectory", "speed", "stability", "derivatives"], []
 
     def rows(name, setup):
         log.append(("rows", name))
@@ -156,8 +156,8 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),
-        ("rows", "trajectory"), ("figures", "trajectory"), ("rows", "speed"), ("rows", "reduction"),
-        ("figures", "speed"), ("figures", "reduction"),
+        ("rows", "trajectory"), ("figures", "trajectory"), ("rows", "speed"), ("rows", "derivatives"),
+        ("figures", "speed"), ("figures", "derivatives"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     for section_of_name, name in zip(sections, names):

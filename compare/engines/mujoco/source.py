@@ -135,6 +135,12 @@ class Source:
         return self.__dict__ | {"_spec": None, "_bare": None}
 
     @property
+    def mesh_geoms(self) -> list[tuple[str, list[bool]]]:
+        """Of each body but the world its name, and whether its geoms are meshes, by their class too; of a URDF nothing."""
+        bodies, mesh = list(self.spec.bodies)[1:] if self.spec else [], mujoco.mjtGeom.mjGEOM_MESH
+        return [(body.name, [geom.type == mesh for geom in body.geoms]) for body in bodies]
+
+    @property
     def spec(self) -> mujoco.MjSpec | None:
         """What is stated: only copies of it are compiled. None: the model was compiled elsewhere."""
         if self._spec is None and self.origin is not None:  # in another process

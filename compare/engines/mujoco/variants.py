@@ -15,7 +15,15 @@ def copied(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def has_free_base(model: mujoco.MjModel) -> bool:
-    return bool((model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).any())
+    """Whether a base would fall: it has a free joint, or slides along gravity on a joint that nothing drives or stops."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    along = np.abs(data.xaxis @ model.opt.gravity) > 0.1 * np.linalg.norm(model.opt.gravity)
+    of_world = model.body_parentid[model.jnt_bodyid] == 0
+    slides = (model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE) & along & of_world
+    slides &= (model.jnt_stiffness == 0.0) & (model.jnt_limited == 0)
+    slides[model.actuator_trnid[model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT, 0]] = False
+    return bool((slides | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)).any())
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
