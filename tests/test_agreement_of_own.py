@@ -296,16 +296,14 @@ def test_accelerations_alone_have_a_mass_matrix_and_a_bias():
     message = message_of(heavier, acceleration=acceleration)
     assert "mass of body 2: 2 kg instead of 2.5" in message.replace("body2", "body 2")
     sprung = PENDULUM.replace('damping="0.3"', 'damping="0.3" stiffness="4" springref="30"')
-    of_degrees = message_of(
-        sprung, acceleration=lambda q, v, t: acceleration(q, v, t - [4.0, 0.0] * (q - 30.0))
-    )
+    in_degrees = lambda q, v, t: acceleration(q, v, t - [4.0, 0.0] * (q - 30.0))  # noqa: E731
+    of_degrees = message_of(sprung, acceleration=in_degrees)
     assert "springref of hip: 30 rad instead of 0.5235987756 (degrees?)" in of_degrees
 
 
 def test_what_differs_is_said_where_no_cause_is_found():
-    message = message_of(
-        mass_matrix=mass_matrix, bias=lambda q, v: bias(q, v) + np.sin(3.0 * q) * np.cos(7.0 * q[::-1])
-    )
+    odd = lambda q, v: bias(q, v) + np.sin(3.0 * q) * np.cos(7.0 * q[::-1])  # noqa: E731
+    message = message_of(mass_matrix=mass_matrix, bias=odd)
     assert "Cause not found. Differs: gravity alone, in h[hip], h[knee]" in message
     assert len(message) < 2000
 

@@ -86,9 +86,7 @@ def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expec
     ('ctrl="0.5 0.25" act="0.1 0.2"', (0.1, 0.2)), ('ctrl="0.5 0.25"', (0.5, 0.25)),
 ])  # fmt: skip
 def test_a_run_starts_with_the_activations_of_its_keyframe_else_where_the_controls_lead(key, activations):
-    filters = (
-        '<general joint="j" dyntype="filter" dynprm="0.1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
-    )
+    filters = "".join(f'<general joint="{joint}" dyntype="filter" dynprm="0.1"/>' for joint in "jk")
     reading = read(text_of(filters, keys=KEYS.format(key)))
     step = Step(reading.model, 1e-3, "Euler")
     step.put(start_of(reading.model, reading.drive, "home", np.zeros(2)))

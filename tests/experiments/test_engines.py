@@ -160,14 +160,8 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
 def test_two_verdicts_stand_side_by_side(report):
     """As read, and as set: gravity can be set, mass and axis cannot; who takes no part is not counted among those who agree."""
     rows = {row["engine"]: row for row in table(report[0], "engines_answer")}
-    verdicts = {
-        label: (rows[label]["as_read"], rows[label]["as_set"]) for label in ("Right", "Upside", "Heavy")
-    }
-    assert verdicts == {
-        "Right": ("same", "same"),
-        "Upside": ("gravity", "same"),
-        "Heavy": ("mass", "not set"),
-    }
+    verdicts = [(rows[label]["as_read"], rows[label]["as_set"]) for label in ("Right", "Upside", "Heavy")]
+    assert verdicts == [("same", "same"), ("gravity", "same"), ("mass", "not set")]
     assert rows["Later"]["as_set"] == "same" and "Blind" not in rows
     shares = {(row["engine"], row["quantity"]): row for row in table(report[0], "engines")}
     assert float(shares["Upside", "bias"]["as_read_over_bar"]) > 1e6
@@ -270,14 +264,10 @@ def test_axes_anchors_and_masses_are_those_by_which_the_bodies_move(number):
     right = tree_of_kinds(np.random.default_rng(3))
     model = OfTree(right)
     for name, values in model.numbers().items():
-        assert np.abs(values - model.stated[name]).max() <= 1e-13 * max(1.0, size_of(model.stated, name)), (
-            name
-        )
-    wrong = {
-        "axis": np.roll(right.axis, 1, axis=1),
-        "offset": np.add(right.offset, 0.1),
-        "mass": np.multiply(right.mass, 2.0),
-    }
+        size = max(1.0, size_of(model.stated, name))
+        assert np.abs(values - model.stated[name]).max() <= 1e-13 * size, name
+    wrong = {"axis": np.roll(right.axis, 1, axis=1), "offset": np.add(right.offset, 0.1)}
+    wrong["mass"] = np.multiply(right.mass, 2.0)
     model.tree = dataclasses.replace(right, **{number: wrong[number].tolist()})
     read = {"offset": "anchor"}.get(number, number)
     assert np.abs(model.numbers()[read] - model.stated[read]).max() > 1e-3

@@ -114,9 +114,8 @@ def test_a_posture_may_be_numbers():
 
 def test_what_bounces_is_not_in_the_air():
     """A light box on a stiff floor never rests at 2 ms: its floor stays, and the step is not stable."""
-    box = BOX.replace('mass="2"', 'mass="1e-6"').replace(
-        "<worldbody>", '<default><geom solref="-1e5 -100"/></default><worldbody>'
-    )
+    box = BOX.replace('mass="2"', 'mass="1e-6"')
+    box = box.replace("<worldbody>", '<default><geom solref="-1e5 -100"/></default><worldbody>')
     place = place_of(box)
     assert place.surroundings == "contact"
     row, _ = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))

@@ -18,7 +18,7 @@ from compare.engines.mujoco.variants import (
 from compare.stability import cures
 from compare.stability.control import controlled
 from compare.stability.growth import grows, growth, has_grown
-from compare.stability.limits import Limit, tried
+from compare.stability.limits import Limit, Tried, tried
 from compare.stability.motion import motion
 from compare.stability.rest import rest_near
 from compare.stability.runs import (
@@ -55,13 +55,21 @@ def test_runs_show_the_limit_within_three_hundredths(text, integrator):
 
 def test_runs_follow_the_rest_from_the_one_below_their_step_and_creep_as_those_near_it():
     """At the limit of a body that tips over another rest is near: from there runs failed at every step."""
-    tries = [
-        SimpleNamespace(dt=dt, is_stable=dt != 4.0, rest=SimpleNamespace(state=dt, speeds=np.array([-dt])))
-        for dt in (2.0, 6.0, 4.0, 3.0)
-    ]
+    rests = {dt: SimpleNamespace(state=dt, speeds=np.array([-dt])) for dt in (2.0, 6.0, 4.0, 3.0)}
+    tries = [SimpleNamespace(dt=dt, is_stable=dt != 4.0, rest=rest) for dt, rest in rests.items()]
     found = Limit("finite", 3.0, None, SimpleNamespace(state=9.0), tries)
     assert [found.state_below(dt) for dt in (1.9, 2.9, 5.0, 7.0)] == [9.0, 2.0, 3.0, 6.0]
     assert [found.creep_near(dt) for dt in (1.0, 1.4, 2.1, 4.1)] == [0.0, 2.0, 3.0, 6.0]
+
+
+@pytest.mark.parametrize("more, stable", [
+    ({}, True), ({"moved": 0.31}, False), ({"run_grows": True}, False), ({"rest": SimpleNamespace(is_found=False)}, False),
+    ({"growth": SimpleNamespace(rate=0.11)}, False), ({"growth": SimpleNamespace(rate=0.11), "drift": 0.056}, True),
+])  # fmt: skip
+def test_a_step_is_stable_at_a_rest_nearby_where_nothing_grows_faster_than_what_grows_by_itself(more, stable):
+    usual = {"rest": SimpleNamespace(is_found=True), "growth": SimpleNamespace(rate=0.09)}
+    usual |= {"dt": 0.1, "drift": 0.0, "moved": 0.29, "run_grows": False}
+    assert Tried(**usual | more).is_stable is stable
 
 
 def test_growth_in_a_run_is_that_of_the_step():
@@ -217,10 +225,8 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula():
     assert found.keys() == {"less_kv", "more_armature"}
     assert 0.999 * less < found["less_kv"] < cures.WITHIN * less
     assert 0.999 * more < found["more_armature"] < cures.WITHIN * more
-    weaker, heavier = (
-        with_kv(place.model, 1.0 / found["less_kv"]),
-        with_armature(place.model, found["more_armature"]),
-    )
+    weaker = with_kv(place.model, 1.0 / found["less_kv"])
+    heavier = with_armature(place.model, found["more_armature"])
     assert not any(grows(rest_near(Step(changed, dt, "Euler"), place.rest)) for changed in (weaker, heavier))
 
 
@@ -247,7 +253,6 @@ def test_each_change_changes_what_it_says():
     assert with_slower_contacts(model, 3.0).geom_solref[:, 0] == pytest.approx(0.06)
     assert with_kv(place_of(KINDS["a box"]).model, 0.5) is None
     assert not with_armature(place_of(KINDS["a box"]).model, 9.0).dof_armature.any()  # of a free joint
-    assert (
-        model.actuator_biasprm[0, 2] == -50.0 and model.opt.impratio == 3.0
-    )  # the model itself is as it was
+    # the model itself is as it was
+    assert model.actuator_biasprm[0, 2] == -50.0 and model.opt.impratio == 3.0
     assert growth(rest_of(FOOT)).factor == 1.0 and Step(model, 1e-3, "Euler").model is not model

@@ -129,9 +129,8 @@ def test_a_posture_that_is_asked_for_is_the_only_one():
         rows = found_of(posture=asked).tables["step_limits"]
         assert {row.posture for row in rows} == {asked}
     reading = read(TURNING.format(dt=0.002, actuator=MOTOR))
-    asked = [
-        standing_at(reading, posture_of(text, reading)).start[1] for text in ("home", "57.29578", "spin")
-    ]
+    postures = [posture_of(text, reading) for text in ("home", "57.29578", "spin")]
+    asked = [standing_at(reading, posture).start[1] for posture in postures]
     assert asked == pytest.approx([0.1, 1.0, 0.0])
 
 
