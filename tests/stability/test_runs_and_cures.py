@@ -72,6 +72,14 @@ def test_a_step_is_stable_at_a_rest_nearby_where_nothing_grows_faster_than_what_
     assert Tried(**usual | more).is_stable is stable
 
 
+@pytest.mark.parametrize("noise, uncertain", [(0.0, False), (0.02, True)])
+def test_growth_within_the_noise_of_differences_is_left_to_a_run(noise, uncertain):
+    A = np.diag([1.01, 0.5])
+    step = SimpleNamespace(dt=0.01, derivative=lambda state, nudge: A + noise * np.eye(2))
+    found = growth(SimpleNamespace(A=A, state=None, step=step))
+    assert (found.is_uncertain, found.factor > 1.0) == (uncertain, not uncertain)
+
+
 def test_growth_in_a_run_is_that_of_the_step():
     place = place_of(hinge(20.0, 5.0))
     for dt in (0.021, 0.03):

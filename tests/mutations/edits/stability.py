@@ -27,5 +27,8 @@ EDITS = (
     ("own_run", "add", "row.outcome in ('alike', 'calm')", "True", "what is not stable in its own run passes"),
     ("own_run", "begin", "list(reading.keyframes)[:MOST_POSTURES]", "list(reading.keyframes)[:1]", "one keyframe is run"),
     ("of_file", "begin", "Asked(*step, [step[1]])", "asked[0]", "a requested step is the file's"),
+    ("stability.limits", "GIVES_WAY", "0.3", "30.0", "a rest far away is the same"),
+    ("stability.limits", "Tried.is_stable", "not self.run_grows", "True", "a run that grows is stable"),
+    ("stability.growth", "growth", "is_uncertain=is_uncertain", "is_uncertain=False", "what may be noise needs no run", 1),
     ("equilibria", "check_reset", "run.first_reset is not None", "False", "no reset is looked at"),
 )  # fmt: skip
