@@ -2,9 +2,9 @@
 
 from ast import dump
 
-from architecture import ROOT
 from mutations.edit import applied
 from mutations.edits import EDITS
+from runs import ROOT
 
 
 def test_every_edit_applies_and_says_what_it_breaks():

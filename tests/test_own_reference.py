@@ -15,7 +15,8 @@ from models import PATHS
 from small_runs import Lines
 
 from compare.core.text import say
-from compare.engines.own.own_file import OwnFileError, own_object
+from compare.engines.own import OwnError
+from compare.engines.own.own_file import own_object
 from compare.experiments import EXPERIMENTS, skipped
 from compare.experiments.setup import Setup, engines
 from compare.run import examine as experiment
@@ -173,6 +174,6 @@ def test_a_file_shadows_no_package_and_finds_the_modules_beside_it(folder):
     assert own_object("numpy.py:").g == 9.81
     assert own_object("numpy.py:pi") == numpy.pi and sys.modules["numpy"] is numpy
     path = list(sys.path)
-    with pytest.raises(OwnFileError):
+    with pytest.raises(OwnError):
         own_object("broken.py:")
     assert sys.path == path

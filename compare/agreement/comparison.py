@@ -1,7 +1,7 @@
 """The arguments of assert_agrees, validated, and each quantity of the user and of MuJoCo."""
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from itertools import product
 from os import PathLike
@@ -99,12 +99,16 @@ class Comparison:
         self.take_random(states, seed)
 
     def read(self, mjcf: Any) -> None:
-        from ..engines.mujoco import engine, read  # here, so that `import compare` need not wait for it
+        from ..engines.mujoco import (
+            engine,
+            read,
+            tree_with_sites,
+        )  # here, so that `import compare` need not wait for it
 
         self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
         self.robot = robot_of(self.reading, "the model")
         self.mujoco = engine(self.reading).of(self.robot.case())
-        self.tree, self.coordinates = self.reading.tree, self.robot.coordinates
+        self.tree, self.coordinates = tree_with_sites(self.reading), self.robot.coordinates
 
     def take_random(self, states: int, seed: int) -> None:
         """Random states, fewer if the user's functions are slow."""
@@ -176,11 +180,19 @@ class Comparison:
         """Each quantity of the user and of MuJoCo."""
         compared = {}
         for name, yours in self.values.items():
-            right = self.asked(self.mujoco, name)
-            own = self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
+            right, own = self.asked(self.mujoco, name), self.own(name)
             scale = np.abs(own(np.broadcast_to(self.scale(name, right), right.shape)))
             compared[name] = Compared(own(yours), own(right), scale, self.rounding * scale)
         return compared
+
+    def own(self, name: str) -> Callable[[np.ndarray], np.ndarray]:
+        """Takes a quantity to the user's joints."""
+        return self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
+
+    def of_mujoco(self, name: str, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
+        """MuJoCo's quantity at other states, in the user's joints."""
+        state = (q, qd, self.tau)[: QUANTITIES[name].arguments]
+        return self.own(name)(np.asarray(getattr(self.mujoco, METHOD_NAMES[name])(*state)))
 
     def scale(self, name: str, right: np.ndarray) -> np.ndarray:
         """The scale of each entry of a quantity, in the model's joints. right: MuJoCo's values."""

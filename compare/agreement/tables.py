@@ -1,16 +1,23 @@
 """What is wrong with a table of values, rather than with equations: a few of its rows, their order, its columns."""
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from numpy import ndarray
 
 from ..core.finding import Finding
+from ..engines.own import QUANTITIES
+from ..judge.agree import over
+from ..judge.scale import EPS
 from .comparison import Compared, Comparison
 
 FEW = 0.15  # of the rows, at most
 LEAST_ROWS = 8
 SHOWN = 4
+MOST_DECIMALS = 8
+WHOLE = 1e-3  # of the last decimal: what is whole
+SECOND_ORDER = 0.05  # of the change by rounding
 MOST_COLUMNS = 400  # entries of a row whose exchanges are tried
 
 
@@ -37,6 +44,17 @@ def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Ite
     def slip(kind: str, **values: object) -> Finding:
         return Finding("agreement", kind, {"quantity": name} | values)
 
+    digits = decimals(yours)
+    if digits and decimals(right) is None:
+        rounded = 0.5 * 10.0**-digits + rounding_of_states(comparison, name).reshape(count, -1)
+        if (np.abs(yours - right) <= rounded * (1.0 + SECOND_ORDER) + tolerance).all():
+            least = over(np.abs(compared.yours - compared.right), compared.scale).max()
+            yield slip(
+                "rounded",
+                decimals=digits,
+                rtol=float(f"{least:.0e}") * 2.0,
+                of_states=bool((rounded > 10.0**-digits).any()),
+            )
     rows = np.flatnonzero(wrong.any(axis=1)).tolist()
     if len(rows) <= FEW * count:
         at = np.argwhere(wrong)[:SHOWN].tolist()
@@ -50,6 +68,28 @@ def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Ite
     if exchanged := columns_exchanged(yours, right, tolerance, wrong):
         pairs = [(names[column], names[other]) for column, other in exchanged.items()]
         yield slip("exchanged_columns", pairs=pairs)
+
+
+def decimals(values: ndarray) -> int | None:
+    """The decimals to which all of some values are rounded; None: they are not."""
+    for digits in range(MOST_DECIMALS + 1):
+        scaled = values * 10.0**digits
+        if np.abs(scaled - np.round(scaled)).max() <= WHOLE + 4.0 * EPS * np.abs(scaled).max():
+            return digits
+    return None
+
+
+def rounding_of_states(comparison: Comparison, name: str) -> ndarray:
+    """By how much a quantity changes within the rounding of a table's q and qd, (states, ...)."""
+    joints, coordinates, right = comparison.joints, comparison.coordinates, comparison.compared[name].right
+    total, rows = np.zeros_like(right), {"q": comparison.q, "qd": comparison.qd}
+    own = {"q": joints.own_positions(comparison.q), "qd": joints.own_speeds(comparison.qd)}
+    sizes = {key: decimals(values) for key, values in own.items() if key in QUANTITIES[name].state}
+    for key, unit in product((key for key, digits in sizes.items() if digits), np.eye(coordinates.nv)):
+        step = 0.5 * 10.0 ** -float(sizes[key] or 0) * unit
+        moved = rows | {key: coordinates.move(comparison.q, step) if key == "q" else comparison.qd + step}
+        total += np.abs(comparison.of_mujoco(name, moved["q"], moved["qd"]) - right)
+    return total
 
 
 def columns_exchanged(yours: ndarray, right: ndarray, tolerance: ndarray, wrong: ndarray) -> dict[int, int]:

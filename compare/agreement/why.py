@@ -6,15 +6,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy import ndarray
 
-from tmt import literal
+from tmt import Tree, literal
 
+from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import say
 from ..diagnosis import STATES_ASKED, Stated, Values, diagnose
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
-from ..engines.own import QUICK
+from ..diagnosis.model import ROUNDED
+from ..engines.own import QUICK, OwnEquations
+from ..robots.coordinates import Coordinates
 from .accelerations import CONSTANT, Affine
 from .comparison import Comparison
 from .tables import slips_of_tables
@@ -28,6 +31,17 @@ class Why(NamedTuple):
 
     text: str = ""
     is_found: bool = True  # whether that is a cause
+    causes: tuple[Cause, ...] = ()  # of accelerations
+
+
+class Asked(NamedTuple):
+    """The accelerations of a user that are explained, and the model that is right."""
+
+    tree: Tree
+    coordinates: Coordinates
+    equations: OwnEquations | None  # None: values alone
+    stated: Stated
+    rounding: float = ROUNDED
 
 
 def cause_of(comparison: Comparison) -> Why:
@@ -43,7 +57,8 @@ def cause_of(comparison: Comparison) -> Why:
     failing = [name for name, compared in comparison.compared.items() if compared.fails]
     values = Values.of(tree, q, qd, M, h, rounding)
     if failing == ["acceleration"]:
-        return of_accelerations(comparison, values, tau, yours["acceleration"])
+        asked = Asked(tree, comparison.coordinates, comparison.equations, Stated(comparison.joints), rounding)
+        return of_accelerations(asked, values, tau, yours["acceleration"])
     of_h = values
     if "gravity" in yours and ("bias" not in yours or ("gravity" in failing and "bias" not in failing)):
         of_h = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
@@ -98,60 +113,67 @@ def beside(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -
     return left_over.sentence() or say(Finding("agreement", "another"))
 
 
-def of_accelerations(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> Why:
+def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right.
 
     values: the user's Mbar and h, as far as they are given; these are right.
     """
-    tree, q, qd, rounding = comparison.tree, values.q, values.qd, comparison.rounding
+    tree, q, qd, rounding = asked.tree, values.q, values.qd, asked.rounding
     right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree), rounding)
     left_over = LeftOver(tree, right, tau, qdd, rounding)
     if left_over.causes:
-        return Why(left_over.sentence())
-    equations, solved = comparison.equations, Why(say(Finding("agreement", "solved")), False)
+        return Why(left_over.sentence(), True, left_over.causes)
+    equations, solved = asked.equations, Why(say(Finding("agreement", "solved")), False)
     is_asked = equations is not None and equations.has("acceleration")
     if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
-        return solved if values.are_finite else of_forces(comparison, right, tau, qdd)
+        return solved if values.are_finite else of_forces(asked, right, tau, qdd)
     affine = Affine(tree, equations)
     inputs = affine.inputs(q)
     if inputs is not None and (np.abs(inputs - 1.0) > CONSTANT).any():
-        return of_inputs(comparison, inputs, LeftOver(tree, right, inputs * tau, qdd, rounding))
+        return of_inputs(asked, inputs, LeftOver(tree, right, inputs * tau, qdd, rounding))
     if values.are_finite:
         return solved
     own = affine.values(q, qd, rounding)
     if own is None:
-        return of_inputless(comparison, affine, right, tau, qdd)
-    functions = (own[1], Stated(comparison.joints), affine.mass_matrix) if equations.seconds <= QUICK else ()
+        return of_inputless(asked, affine, right, tau, qdd)
+    functions = (own[1], asked.stated, affine.mass_matrix) if equations.seconds <= QUICK else ()
     diagnosis = diagnose(tree, own[0], SECONDS_OF_CAUSE, *functions)
-    return Why(diagnosis.sentence(), bool(diagnosis.causes))
+    return Why(diagnosis.sentence(), bool(diagnosis.causes), diagnosis.causes)
 
 
-def of_inputs(comparison: Comparison, factors: ndarray, left_over: LeftOver) -> Why:
+def of_inputs(asked: Asked, factors: ndarray, left_over: LeftOver) -> Why:
     """Torques that act with other factors, and what else acts; left_over: with these factors."""
-    names = comparison.coordinates.speeds
-    wrong = [(names[i], float(x)) for i, x in enumerate(factors) if abs(x - 1.0) > CONSTANT]
+    wrong = [
+        (asked.coordinates.speeds[i], float(x)) for i, x in enumerate(factors) if abs(x - 1.0) > CONSTANT
+    ]
+    causes = tuple(
+        Cause(rank=2, kind="input", place=f"tau of {name}", stated=1.0, explains=x, unit="times")
+        for name, x in wrong
+    )
     text = say(Finding("agreement", "inputs", {"factors": wrong}))
-    return Why(f"{text} {left_over.sentence()}".rstrip(), left_over.ratio <= 1.0 or bool(left_over.causes))
+    is_found = left_over.ratio <= 1.0 or bool(left_over.causes)
+    return Why(f"{text} {left_over.sentence()}".rstrip(), is_found, causes + left_over.causes)
 
 
-def of_inputless(comparison: Comparison, affine: Affine, right: Values, tau: ndarray, qdd: ndarray) -> Why:
+def of_inputless(asked: Asked, affine: Affine, right: Values, tau: ndarray, qdd: ndarray) -> Why:
     """Torques of some joints that change nothing, so that the accelerations have no mass matrix."""
-    slopes, names = affine.slopes(right.q), comparison.coordinates.speeds
+    slopes = affine.slopes(right.q)
     idle = ~(np.abs(slopes) > CONSTANT * np.abs(slopes).max(initial=1.0)).any(axis=(0, 1))
     if not idle.any():
         return Why(say(Finding("agreement", "accelerations_alone")), False)
-    text = say(Finding("agreement", "inputs", {"factors": [(names[i], 0.0) for i in np.flatnonzero(idle)]}))
-    if LeftOver(comparison.tree, right, tau * ~idle, qdd, comparison.rounding).ratio <= 1.0:
-        return Why(text)
-    more = of_forces(comparison, right, tau * ~idle, qdd)
-    return Why(f"{text} {more.text}", more.is_found)
+    left_over = LeftOver(asked.tree, right, tau * ~idle, qdd, asked.rounding)
+    idle_alone = of_inputs(asked, 1.0 - idle, left_over)
+    if left_over.ratio <= 1.0 or left_over.causes:
+        return idle_alone
+    more = of_forces(asked, right, tau * ~idle, qdd)
+    return Why(f"{idle_alone.text} {more.text}", more.is_found, idle_alone.causes + more.causes)
 
 
-def of_forces(comparison: Comparison, right: Values, tau: ndarray, qdd: ndarray) -> Why:
+def of_forces(asked: Asked, right: Values, tau: ndarray, qdd: ndarray) -> Why:
     """What explains accelerations by the forces Mbar qdd + h = tau - D qd - k (q - rest) that they need."""
-    left_over = LeftOver(comparison.tree, right, tau, qdd, comparison.rounding)
+    left_over = LeftOver(asked.tree, right, tau, qdd, asked.rounding)
     force = left_over.force + right.bias + np.einsum("sij,sj->si", right.mass_matrix, qdd)
     alone = right._replace(bias=force, tolerances=(right.tolerances[0], left_over.tolerance))
-    diagnosis = diagnose(comparison.tree, alone, SECONDS_OF_CAUSE, stated=Stated(comparison.joints), qdd=qdd)
+    diagnosis = diagnose(asked.tree, alone, SECONDS_OF_CAUSE, stated=asked.stated, qdd=qdd)
     text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
-    return Why(text, bool(diagnosis.causes))
+    return Why(text, bool(diagnosis.causes), diagnosis.causes)

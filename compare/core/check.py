@@ -10,7 +10,6 @@ import numpy as np
 
 from .cause import Cause
 from .finding import Finding
-from .pictures import Pictures
 
 RULES = {"at most": operator.le, "at least": operator.ge, "equal": operator.eq}  # which values pass
 ENDS = "runs to its end"  # names of checks
@@ -99,7 +98,6 @@ class Result:
     top: list[Finding] = field(default_factory=list)  # for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that is compared with MuJoCo
     headline: Finding | None = None  # for the first screen; None: the number of checks that pass
-    pictures: Sequence[Pictures] = ()  # of motions, for the page
     answer: Finding | None = None  # added to the answers to the assignment's questions that name it
 
     def finding(self, kind: str, of: str = "", **values: Any) -> Finding:

@@ -10,10 +10,9 @@ Tables, CSV files and figures read the fields; no unit is known by a name.
 """
 
 import dataclasses
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 RAD = "rad"
 MOVEMENT = "movement"  # the unit of a column: that of a MovementRow
@@ -47,8 +46,6 @@ def column(
 class Row:
     """A row of a table; its columns are its fields, in their order."""
 
-    SHARE: ClassVar[str] = ""  # the field that is its share of a tolerance
-
     def columns(self) -> dict[str, tuple[str, Column]]:
         """The fields by the names of their columns: (name of the field, Column)."""
         columns = {}
@@ -65,15 +62,6 @@ class Row:
     def record(self) -> dict[str, Any]:
         """The values by the names of their columns."""
         return {name: getattr(self, field) for name, (field, _) in self.columns().items()}
-
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        """A key: of a long table, the rows with the smallest are shown.
-
-        False if the row fails; False if it differs from a stated number; minus its share of a tolerance.
-        """
-        share = getattr(self, self.SHARE) if self.SHARE else None
-        return getattr(self, "passed", True) is not False, True, math.inf if share is None else -share
 
 
 @dataclass(kw_only=True)

@@ -5,13 +5,15 @@ Each kind is one function in KINDS, which yields the place, what it explains, an
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from itertools import combinations, permutations
+from itertools import combinations, permutations, product
 
 import numpy as np
 from numpy import ndarray
 
+import tmt
+
 from ..core.words import listed
-from .model import Changes, Equations, Path
+from .model import Changes, Equations, Frame, Path
 from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
 from .variants import Variant, variant
 
@@ -22,6 +24,7 @@ UNITS = {  # factors of units that are taken for others, and the fields of a tre
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
+EQUAL = 1e-12  # of a moment of inertia: two that are equal but for rounding
 Edit = tuple[str, str, dict[str, ndarray]]
 Way = Callable[[ndarray], ndarray]
 Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains
@@ -90,7 +93,7 @@ def axial_for_transverse(I: ndarray) -> ndarray:
     moments = np.diag(I)
     for k in range(3):
         axial, (first, second) = moments[k], np.delete(moments, k)
-        if first == second != axial:
+        if abs(first - second) <= EQUAL * axial and first != axial:
             return np.where(DIAGONAL, np.diag(np.where(np.arange(3) == k, first, axial)), I)
     return I
 
@@ -107,23 +110,40 @@ def ways_of_vectors(name: str) -> Ways:
 def of_rows(equations: Equations) -> Iterator[Edit]:
     """The tensors, CoMs and offsets of bodies and joints, one, those that are alike, or all."""
     bodies, joints = sets_of_bodies(equations.tree), sets_of_joints(equations.tree)
+    frames = [equations.frame_of(b) for b in range(len(equations.tree.mass))]
+    of_parents = [Frame(np.zeros(3), equations.axes_at(parent)) for parent in equations.tree.parent]
     kinds = (
-        ("inertia", bodies, ways_of_tensors()), ("com", bodies, ways_of_vectors("CoM of {}")),
-        ("offset", joints, ways_of_vectors("offset of {}")),
+        ("inertia", bodies, ways_of_tensors(), frames), ("com", bodies, ways_of_vectors("CoM of {}"), frames),
+        ("offset", joints, ways_of_vectors("offset of {}"), of_parents),
     )  # fmt: skip
-    for field, sets, ways in kinds:
+    for field, sets, ways, axes in kinds:
         for name, rows in sets.items():
             for (place, explains), new in ways.items():
                 after = equations.stated[field].copy()
-                after[rows] = [new(row) for row in after[rows]]
+                for row in rows:
+                    after[row] = in_frame(new, axes[row])(after[row])
                 yield place.format(name), explains, {field: after}
+
+
+def in_frame(new: Way, frame: Frame) -> Way:
+    """The change of a vector or tensor whose components are those in a frame."""
+    origin, R = frame
+
+    def change(row: ndarray) -> ndarray:
+        if row.ndim == 2:
+            return R @ new(R.T @ row @ R) @ R.T
+        return R @ new(R.T @ (row - origin)) + origin
+
+    return change
 
 
 def about_one_axis(equations: Equations) -> Iterator[Edit]:
     """The moment of inertia about one axis left out of every body, as of thin rods."""
     for k, axis in enumerate(XYZ if len(equations.tree.mass) > 1 else ""):
         after = equations.stated["inertia"].copy()
-        after[:, k, k] = 0.0
+        for b, I in enumerate(after):
+            along = equations.frame_of(b).axes[:, k]
+            after[b] = I - along @ I @ along * np.outer(along, along)
         yield f"inertia {axis}{axis} of {EVERY_BODY}", "left out", {"inertia": after}
 
 
@@ -189,14 +209,64 @@ def scaled(equations: Equations) -> Iterator[Edit]:
 
 def axes(equations: Equations) -> Iterator[Edit]:
     """A hinge or slide along another axis of its frame; its other sense is a convention."""
-    for name, joint in zip(equations.tree.joint_names, equations.tree.coordinates.joints):
+    for i, joint in enumerate(equations.tree.coordinates.joints):
+        name, own = equations.tree.joint_names[i], equations.axes_at(i)
         for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0) if joint.kind != "ball"):
             new = equations.stated["axis"].copy()
-            before, new[joint.qd.start] = new[joint.qd.start].copy(), sign * np.eye(3)[k]
+            before, new[joint.qd.start] = new[joint.qd.start].copy(), sign * own[:, k]
             if not np.allclose(new[joint.qd.start], -before):
                 yield f"axis of {name}", f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
 
 
+def turns(equations: Equations) -> Iterator[Edit]:
+    """The fixed turn of a body in the body before (euler, rpy), or of all bodies: left out, transposed, in another order."""
+    tree, before = equations.tree, [equations.axes_at(parent) for parent in equations.tree.parent]
+    ways: dict[str, Way] = {
+        "left out": lambda turn: turn @ turn.T, "transposed": np.transpose, "angles in the other order": in_other_order,
+        "angles in the other order, z, y, x": lambda turn: in_other_order(turn.T).T,
+    }  # fmt: skip
+    fixed = [before[i].T @ equations.axes_at(i) for i in range(len(before))]
+    turned = [i for i, turn in enumerate(fixed) if not np.allclose(turn, np.eye(3))]
+    sets = {tree.joint_names[i]: [i] for i in turned} | ({"every joint": turned} if len(turned) > 1 else {})
+    for (name, joints), (explains, way) in product(sets.items(), ways.items()):
+        after = {field: equations.stated[field].copy() for field in ("axis", "offset", "com", "inertia")}
+        for i in joints[::-1]:  # from the tips
+            turn(tree, i, after, before[i] @ way(fixed[i]) @ fixed[i].T @ before[i].T)
+        yield f"fixed turn at {name} (euler, quat or rpy)", explains, after
+
+
+def turn(tree: tmt.Tree, joint: int, fields: dict[str, ndarray], by: ndarray) -> None:
+    """Turn all that a joint carries, where all joints are at zero."""
+    carried = [k for k in range(len(tree.parent)) if joint in tree.path(k)]
+    bodies = [b for b, k in enumerate(tree.body_joint) if k in carried]
+    speeds = np.concatenate([np.arange(len(tree.axis))[tree.coordinates.joints[k].qd] for k in carried])
+    for field, rows in {"axis": speeds, "offset": carried[1:], "com": bodies}.items():
+        fields[field][rows] = fields[field][rows] @ by.T
+    fields["inertia"][bodies] = by @ fields["inertia"][bodies] @ by.T
+
+
+def in_other_order(turn: ndarray) -> ndarray:
+    """A turn by angles about x, y, z with the same angles about z, y, x."""
+    x, y, z = angles_of(turn)
+    return about(0, x) @ about(1, y) @ about(2, z)
+
+
+def angles_of(turn: ndarray) -> ndarray:
+    """Roll, pitch and yaw, rad: turn = Rz(yaw) Ry(pitch) Rx(roll)."""
+    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
+    if np.hypot(turn[0, 0], turn[1, 0]) < EQUAL:  # yaw and roll turn about the same axis
+        return np.array([np.arctan2(-turn[1, 2], turn[1, 1]), pitch, 0.0])
+    return np.array([np.arctan2(turn[2, 1], turn[2, 2]), pitch, np.arctan2(turn[1, 0], turn[0, 0])])
+
+
+def about(k: int, angle: float) -> ndarray:
+    """The turn by an angle about an axis."""
+    i, j = (k + 1) % 3, (k + 2) % 3
+    turn = np.eye(3)
+    turn[[i, i, j, j], [i, j, i, j]] = np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)
+    return turn
+
+
 KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
-    absent, of_rows, about_one_axis, swapped, scaled, axes,
+    absent, of_rows, about_one_axis, swapped, scaled, axes, turns,
 )  # fmt: skip

@@ -8,6 +8,7 @@ from numpy import ndarray
 from ..core.cause import Cause
 from ..core.words import listed
 from ..robots.coordinates import point_inertia
+from .edits import angles_of
 from .fit import Search
 from .model import Equations, Path
 from .places import INERTIA, SMALL
@@ -76,7 +77,9 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
         com, tensor = numbers[1:4] / mass, np.zeros((3, 3))
         for (_, i, j), x in zip(INERTIA, numbers[4:]):
             tensor[i, j] = tensor[j, i] = x
-        tensor = tensor - point_inertia(com, mass)
+        frame = equations.frame_of(equations.tree.body_names.index(body))
+        tensor = frame.axes.T @ (tensor - point_inertia(com, mass)) @ frame.axes
+        com = frame.axes.T @ (com - frame.origin)
         where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(com) < ZERO, 0.0, com))
         explains, is_known = f"{mass:.5g} kg, CoM ({where}) m", determined[4:].all()
         of_tensor = {name: tensor[i, j] for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass}
@@ -85,6 +88,48 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
         is_possible = not is_known or np.linalg.eigvalsh(tensor)[0] >= -ZERO * mass
         if is_possible and all(map(is_round, (mass, *com))):
             yield Cause(rank=3, kind="load", place=f"a load on {body}", stated="", explains=explains)
+
+
+def turned(equations: Equations, search: Search) -> Iterator[Cause]:
+    """The tensor of a body about other axes, with the same principal moments: the turn of an inertial frame."""
+    for b, columns in enumerate(body_columns(equations)[:, -6:]):
+        added, determined = fit(search, columns)
+        axes, stated = equations.frame_of(b).axes, equations.stated["inertia"][b]
+        tensor = stated.copy()
+        for (_, i, j), x in zip(INERTIA, added):
+            tensor[[i, j], [j, i]] = stated[i, j] + x
+        right, before = principal(axes.T @ stated @ axes)
+        moments, after = principal(axes.T @ tensor @ axes)
+        is_same = np.abs(moments - right).max() <= SMALL * right[-1]
+        if not (determined.all() and is_same and np.diff(right).min() > ZERO * right[-1]):
+            continue
+        signs = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+        near = sorted(((after * sign) @ before.T for sign in signs), key=np.trace, reverse=True)
+        ways = [
+            (how, *of_angles(turn if how == "turned" else turn.T))
+            for turn in near
+            for how in ("turned", "turned back")
+        ]
+        for how, angles, unit in ways:
+            if all(map(is_round, angles)):
+                explains = f"{how} by rpy = ({', '.join(f'{angle:.5g}' for angle in angles)}) {unit}"
+                place = f"inertia of {equations.tree.body_names[b]}"
+                yield Cause(rank=2, kind="numbers", place=place, stated="", explains=explains)
+                break
+
+
+def of_angles(turn: ndarray) -> tuple[ndarray, str]:
+    """Its roll, pitch and yaw, with their unit: deg, if they are round in it."""
+    angles = angles_of(turn)
+    angles = np.where(np.abs(angles) < ZERO, 0.0, angles)
+    degrees = np.degrees(angles)
+    return (degrees, "deg") if all(map(is_round, degrees)) else (angles, "rad")
+
+
+def principal(tensor: ndarray) -> tuple[ndarray, ndarray]:
+    """Principal moments, and their axes as the columns of a turn."""
+    moments, axes = np.linalg.eigh(tensor)
+    return moments, axes * [np.linalg.det(axes), 1.0, 1.0]
 
 
 def several(search: Search) -> Iterator[Cause]:

@@ -52,9 +52,11 @@ def of_one(cause: Cause, equations: Equations) -> float:
 
 
 def of_factor(factor: float, equations: Equations) -> float:
-    """A common factor costs little, a length or one over a length more."""
+    """A common factor costs little, degrees for rad a little, a length or one over a length more."""
     if is_common(factor):
         return 0.0
+    if np.isclose(abs(log10(abs(factor))), log10(180.0 / np.pi), rtol=1e-9):
+        return 0.1
     lengths = np.abs(np.concatenate([equations.stated["offset"].ravel(), equations.stated["com"].ravel()]))
     lengths = lengths[lengths > 0.0]
     is_power = np.isclose(np.concatenate([lengths, 1.0 / lengths]), abs(factor), rtol=1e-9, atol=0.0).any()

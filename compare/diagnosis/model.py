@@ -30,6 +30,7 @@ OF_TERM = {  # of each body: T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' 
     "gyroscopic": "gyroscopic moment omega x I omega of {}",
 }  # fmt: skip
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
+WHOLE = 1e-12  # of components of axes from whole numbers
 TINY = 1e-100  # an imaginary change, whose square vanishes
 ROUNDED = FACTOR * EPS  # of the scale of an entry
 
@@ -39,6 +40,13 @@ class Path(NamedTuple):
 
     field: str
     at: tuple[int, ...]
+
+
+class Frame(NamedTuple):
+    """A body's frame in the file, in which its numbers are said; the Tree's frames are parallel to the world at zero."""
+
+    origin: ndarray  # in the frame of the joint
+    axes: ndarray  # as columns
 
 
 class Entry(NamedTuple):
@@ -137,6 +145,19 @@ class Equations:
     def bodies(self) -> list[method.Body]:
         return method.bodies(self.tree, list(self.q.T), list(self.qd.T))
 
+    def frame_of(self, body: int) -> Frame:
+        site = self.tree.site_of(self.tree.body_names[body])
+        return Frame(np.array(site.offset), whole(np.array(site.turn, float)))
+
+    def axes_at(self, joint: int) -> ndarray:
+        """The axes of the file's body that a joint moves, as columns; of a joint without one, of that which it carries."""
+        of_joints = dict(zip(self.tree.site_joint[::-1], self.tree.site_turn[::-1]))
+        carried = (
+            k for k in range(joint, len(self.tree.parent)) if k in of_joints and joint in self.tree.path(k)
+        )
+        turn = of_joints.get(next(carried, -1)) if joint >= 0 else None
+        return np.eye(3) if turn is None else whole(np.array(turn))
+
     @cached_property
     def terms(self) -> dict[str, ndarray]:
         """What each term of all bodies adds, (bodies, states, entries)."""
@@ -228,6 +249,12 @@ class Equations:
             table[..., nv * nv : -nv],
             table[..., -nv:],
         )
+
+
+def whole(numbers: ndarray) -> ndarray:
+    """Numbers with those that are whole but for rounding rounded."""
+    near = np.round(numbers)
+    return np.where(np.abs(numbers - near) < WHOLE, near, numbers)
 
 
 def vectors(rows: Sequence[Sequence[Vector]], count: int) -> ndarray:

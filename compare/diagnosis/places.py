@@ -16,13 +16,16 @@ from ..core.cause import Cause
 from ..core.words import listed
 from ..robots.coordinates import Coordinates
 from ..robots.joint_map import within_a_turn
-from .model import Equations, Path
+from .model import WHOLE, Equations, Frame, Path
 
 XYZ = "xyz"
 INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
 EVERY_BODY = "every body"
 COMMON_FACTORS = (-1.0, 0.0, 0.5, 1.0, 2.0)
 OF_ZERO = "zero position"  # the kind of a place
+DEGREES = np.outer(
+    (90, 180, 45, 30, 60, 15, 120, 135, 150, 270), (1.0, -1.0)
+).ravel()  # angles that are written as rad
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 SMALL = 1e-9  # of the other numbers: a number that a regression leaves at 0
 ALL = slice(None)  # entries of a state
@@ -62,9 +65,15 @@ class Place(NamedTuple):
         return self.value(change) >= self.least
 
     def cause(self, change: float) -> Cause:
-        """The change as a cause."""
-        rank, kind, stated, explains = self.rank, self.kind, float(self.stated), self.value(change)
-        return Cause(rank=rank, kind=kind, place=self.name, stated=stated, explains=explains, unit=self.unit)
+        """The change as a cause; of a zero that is a number of degrees taken as rad, this number."""
+        place, unit = self.name, self.unit
+        if self.kind == OF_ZERO and unit == "rad":
+            turns = (change - DEGREES + np.radians(DEGREES)) / (2.0 * np.pi)
+            for angle in np.abs(DEGREES[np.abs(turns - np.round(turns)) < FIT_ROUNDING]).tolist():
+                right = float(np.radians(angle))
+                return Cause(rank=2, kind="number", place=place, stated=right, explains=angle, unit=unit)
+        stated, explains = float(self.stated), self.value(change)
+        return Cause(rank=self.rank, kind=self.kind, place=place, stated=stated, explains=explains, unit=unit)
 
 
 def factor(kind: str, name: str, column: np.ndarray, entries: Entries = ALL, stated: float = 1.0) -> Place:
@@ -124,36 +133,53 @@ def numbers(equations: Equations) -> Iterator[Place]:
         now = float(stated[path.field][path.at])
         return Place("number", name, now, unit, float(size), ((path, 1.0),), least=least)
 
-    def triple(name: str, unit: str, size: float, field: str, *index: int) -> list[Place]:
-        return [number(name.format(axis), unit, size, Path(field, (*index, k))) for k, axis in enumerate(XYZ)]
+    def component(
+        name: str, unit: str, size: float, path: Path, along: np.ndarray, origin: np.ndarray | float = 0.0,
+        least: float = -np.inf,
+    ) -> Place:  # fmt: skip
+        """The component of a vector or tensor along an axis, or the product of two, of the file's frame."""
+        now = float((along * (stated[path.field][path.at] - origin)).sum() / (along * along).sum())
+        moves = [(Path(path.field, (*path.at, *at)), float(x)) for at, x in np.ndenumerate(along) if x]
+        now = 0.0 if abs(now) < WHOLE * size else now
+        return Place("number", name, now, unit, float(size), tuple(moves), least=least)
+
+    def triple(name: str, unit: str, size: float, path: Path, frame: Frame) -> list[Place]:
+        axes = zip(XYZ, frame.axes.T)
+        return [component(name.format(axis), unit, size, path, along, frame.origin) for axis, along in axes]
 
     for b, body in enumerate(tree.body_names):
         heavy = stated["mass"][b] or heaviest
         yield number(f"mass of {body}", "kg", heavy, Path("mass", (b,)), least=0.0)
-        yield from triple(f"CoM {{}} of {body}", "m", length, "com", b)
+        frame = equations.frame_of(b)
+        yield from triple(f"CoM {{}} of {body}", "m", length, Path("com", (b,)), frame)
         size = np.abs(stated["inertia"][b]).max() or heavy * length**2
         for name, i, j in INERTIA:
-            path, mirrored = Path("inertia", (b, i, j)), Path("inertia", (b, j, i))
-            place = number(f"inertia {name} of {body}", "kg m2", size, path, 0.0 if i == j else -np.inf)
-            yield place if i == j else place._replace(moves=((path, 1.0), (mirrored, 1.0)))
+            along = np.outer(frame.axes[:, i], frame.axes[:, j])
+            along, least = (along, 0.0) if i == j else (along + along.T, -np.inf)
+            called = f"inertia {name} of {body}"
+            yield component(called, "kg m2", size, Path("inertia", (b,)), along, least=least)
     for i, (name, joint) in enumerate(zip(tree.joint_names, tree.coordinates.joints)):
         carried = [("com", b) for b, of_joint in enumerate(tree.body_joint) if of_joint == i]
         carried += [("offset", j) for j, parent in enumerate(tree.parent) if parent == i]
-        for k, place in enumerate(triple(f"offset {{}} of {name}", "m", length, "offset", i)):
+        of_parent = Frame(np.zeros(3), equations.axes_at(tree.parent[i]))
+        for place in triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent):
             yield place
             if joint.kind != "slide":
-                stays = [(Path(field, (index, k)), -1.0) for field, index in carried]
-                yield place._replace(name=f"anchor {XYZ[k]} of {name}", moves=(*place.moves, *stays))
+                along = [(path.at[1], x) for path, x in place.moves]
+                stays = [(Path(field, (index, k)), -x) for field, index in carried for k, x in along]
+                anchor = place.name.replace("offset", "anchor", 1)
+                yield place._replace(name=anchor, moves=(*place.moves, *stays))
         if joint.kind != "ball":
             size = length if joint.kind == "slide" else 1.0
             zero = number(f"zero of {name}", unit_of("rad", joint.kind), size, Path("reference", (i,)))
             yield zero._replace(kind=OF_ZERO)
-            yield from triple(f"axis {{}} of {name}", "", 0.5, "axis", joint.qd.start)
+            own = Frame(np.zeros(3), equations.axes_at(i))
+            yield from triple(f"axis {{}} of {name}", "", 0.5, Path("axis", (joint.qd.start,)), own)
         for speed in range(joint.qd.start, joint.qd.stop):
             size = heaviest * (1.0 if joint.kind == "slide" else length**2)
             path, unit = Path("armature", (speed,)), unit_of("kg m2", joint.kind)
             yield number(f"armature of {equations.speeds[speed]}", unit, size, path, least=0.0)
-    yield from triple("gravity {}", "m/s2", 9.81, "gravity")
+    yield from triple("gravity {}", "m/s2", 9.81, Path("gravity", ()), Frame(np.zeros(3), np.eye(3)))
 
 
 def tied(equations: Equations) -> Iterator[Place]:

@@ -20,7 +20,7 @@ from .conventions import Convention, all_conventions, values_in
 from .edits import edits
 from .fit import PROMISING, Fitted, OutOfTime, Search
 from .given import Bias, Given
-from .groups import loads, several
+from .groups import loads, several, turned
 from .likelihood import NATURAL, cost
 from .model import Values
 from .places import OF_ZERO
@@ -140,8 +140,9 @@ class Explanations:
         yield from self.search.explained(self.recursions)
 
     def groups(self) -> Iterator[Cause]:
-        """Loads, and numbers of all bodies or joints."""
+        """Loads, tensors about other axes, and numbers of all bodies or joints."""
         yield from loads(self.equations, self.search)
+        yield from turned(self.equations, self.search)
         yield from several(self.search)
 
     def of_parts(self) -> Iterator[Cause]:

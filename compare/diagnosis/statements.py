@@ -28,10 +28,9 @@ class Statements(NamedTuple):
         """The fits as causes; of zeros of joints with the joints to state."""
         causes = []
         for fit in fits:
-            if all(place.kind == OF_ZERO for place in fit.places):
-                causes += self.restated(fit.cause, self.with_zeros(fit))
-            else:
-                causes.append(fit.cause)
+            cause = fit.cause
+            are_zeros = all(part.kind == OF_ZERO for part in cause.parts or (cause,))
+            causes += self.restated(cause, self.with_zeros(fit)) if are_zeros else [cause]
         return causes
 
     def with_zeros(self, fit: Fitted) -> JointMap:

@@ -6,6 +6,7 @@ A variant is a cause with Mbar and h as they would be, as `Equations.values` has
 from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import combinations, permutations, product
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,7 @@ OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, an
     ("Mdot qd in h", "halved, and no gradient of the kinetic energy"): (0.5, 0.0),
 }  # fmt: skip
 OF_FACTORS = "coefficient", "term", "part"  # kinds of places
+MOST_HINGES = 4  # of which products of sines and cosines are tried
 CLOSE = 1e-6  # of a coefficient, before the values are compared
 OF_SLOPES = {"left out": 0.0, "of the other sign": -1.0, "halved": 0.5, "twice": 2.0}
 
@@ -114,52 +116,104 @@ def exchanged_angles(equations: Equations) -> Iterator[Variant]:
                 yield variant(2, "angle", f"sine and cosine of {name} exchanged in {part}", "", "", values)
 
 
-def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
-    """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
-    tree, functions, pairs = (
-        equations.tree,
-        {"0": 0.0 * equations.q[:, 0], "1": 0.0 * equations.q[:, 0] + 1.0},
-        [],
-    )
-    hinges = {
-        name: equations.q[:, joint.q.start] - zero
-        for name, zero, joint in zip(tree.joint_names, tree.reference, tree.coordinates.joints)
-        if joint.kind == "hinge"
-    }
-    angles = dict(hinges)
-    for first, second in combinations(hinges, 2):
-        angles[f"{first} + {second}"] = hinges[first] + hinges[second]
-        angles[f"{first} - {second}"] = hinges[first] - hinges[second]
+class Functions(NamedTuple):
+    """Functions of the positions, (functions, states), with their names, and which are taken for which, (pairs, 2)."""
+
+    names: list[str]
+    values: np.ndarray
+    pairs: np.ndarray  # the wrong and the right one
+
+
+def functions_of(equations: Equations, hinges: dict[str, np.ndarray]) -> Functions:
+    """Sines and cosines of hinges and of their sums, their squares, and products of those of several hinges."""
+    values = {"0": 0.0 * equations.q[:, 0], "1": 0.0 * equations.q[:, 0] + 1.0}
+    angles, pairs = sums_of(hinges), []
     for name, angle in angles.items():
         sine, cosine = f"sin({name})", f"cos({name})"
-        functions |= {sine: np.sin(angle), f"{sine}^2": np.sin(angle) ** 2}
-        functions |= {cosine: np.cos(angle), f"{cosine}^2": np.cos(angle) ** 2}
+        values |= {sine: np.sin(angle), f"{sine}^2": np.sin(angle) ** 2}
+        values |= {cosine: np.cos(angle), f"{cosine}^2": np.cos(angle) ** 2}
         pairs += [(sine, "0"), (cosine, "0"), ("1", sine), ("1", cosine), (sine, cosine)]
         pairs += [(sine, f"{sine}^2"), (cosine, f"{cosine}^2"), (f"{sine}^2", f"{cosine}^2")]
     for first, second in combinations(angles, 2):
         pairs += [(f"{function}({first})", f"{function}({second})") for function in ("sin", "cos")]
+    tables = [factors_of(name) for name in hinges] if len(hinges) <= MOST_HINGES else []
+    for factors in product(*tables):
+        name = named(factors)
+        values.setdefault(name, np.prod([values[factor] for factor in name.split(" ")], axis=0))
+        for k, factor in enumerate(factors):
+            pairs += [(named((*factors[:k], other, *factors[k + 1 :])), name) for other in tables[k][factor]]
+    slides = zip(equations.tree.joint_names, equations.tree.coordinates.joints)
+    lengths = {name: equations.q[:, joint.q.start] for name, joint in slides if joint.kind == "slide"}
+    every, all_pairs = dict(values), list(pairs)
+    for name, length in lengths.items():
+        for power, called in {1: name, 2: f"{name}^2"}.items():
+            every |= {f"{called} {function}": length**power * column for function, column in values.items()}
+            all_pairs += [(f"{called} {wrong}", f"{called} {right}") for wrong, right in pairs]
+    numbers = {name: k for k, name in enumerate(every)}
+    known = [(numbers[wrong], numbers[right]) for wrong, right in all_pairs if wrong in numbers]
+    return Functions(list(every), np.array(list(every.values())), np.array(known))
+
+
+def sums_of(hinges: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The angles of hinges, and sums and differences of two or three of them."""
+    angles = dict(hinges)
+    for count in (2, 3) if len(hinges) <= MOST_HINGES else (2,):
+        for (first, *others), *signs in product(combinations(hinges, count), *[(1.0, -1.0)] * (count - 1)):
+            terms = list(zip(signs, others))
+            name = first + "".join(f" {'+' if sign > 0.0 else '-'} {other}" for sign, other in terms)
+            angles[name] = hinges[first] + sum(sign * hinges[other] for sign, other in terms)
+    return angles
+
+
+def named(factors: Iterable[str]) -> str:
+    return " ".join(filter(None, factors)) or "1"
+
+
+def factors_of(hinge: str) -> dict[str, tuple[str, ...]]:
+    """What a product may have of a hinge, and what is taken for it."""
+    sine, cosine = f"sin({hinge})", f"cos({hinge})"
+    return {
+        "": (), sine: (cosine, ""), cosine: (sine, ""), f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
+        f"{sine}^2": (f"{cosine}^2", sine, ""), f"{cosine}^2": (f"{sine}^2", cosine, ""),
+    }  # fmt: skip
+
+
+def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
+    """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
+    joints = zip(equations.tree.joint_names, equations.tree.reference, equations.tree.coordinates.joints)
+    hinges = {
+        name: equations.q[:, joint.q.start] - zero for name, zero, joint in joints if joint.kind == "hinge"
+    }
     yield from exchanged_angles(equations)
-    added = parallel(search, unit_columns(equations).items())
-    for (place, column, found), (wrong, right) in product(list(added), pairs):
-        change = functions[wrong] - functions[right]
-        size = float(change @ found / (change @ change))
-        if np.abs(size * change - found).max() <= CLOSE * abs(size):
-            yours, other = (wrong, right) if size > 0.0 else (right, wrong)
-            terms = {name: f"{abs(size):.6g} {name}".removesuffix(" 1") for name in (yours, other)}
-            said = f"{terms[yours]} instead of {terms[other]}"
-            said = f"{terms[other]} left out" if yours == "0" else said
-            said = f"{terms[yours]} added" if other == "0" else said
-            yield variant(2, "angle", place, "", said, search.right + (size * change)[:, None] * column)
+    added = list(parallel(search, unit_columns(equations).items()))
     places = [place for place in search.places if place.kind in OF_FACTORS]
     places.sort(key=lambda place: OF_FACTORS.index(place.kind))
     columns = [(place.name, place.column) for place in places if place.column is not None]
     multiplied = list(parallel(search, columns))
+    if not added and not multiplied:
+        return
+    functions = functions_of(equations, hinges)
+    wrong, right = functions.pairs.T
+    changes = functions.values[wrong] - functions.values[right]
+    squares = (changes**2).sum(axis=1)
+    for place, column, found in added:
+        sizes = changes @ found / squares
+        left = np.abs(sizes[:, None] * changes - found).max(axis=1)
+        for k in np.flatnonzero(left <= CLOSE * np.abs(sizes)).tolist():
+            names, size = [functions.names[at] for at in functions.pairs[k]], float(sizes[k])
+            yours, other = names if size > 0.0 else names[::-1]
+            terms = {name: f"{abs(size):.6g} {name}".removesuffix(" 1") for name in (yours, other)}
+            said = f"{terms[yours]} instead of {terms[other]}"
+            said = f"{terms[other]} left out" if yours == "0" else said
+            said = f"{terms[yours]} added" if other == "0" else said
+            yield variant(2, "angle", place, "", said, search.right + (size * changes[k])[:, None] * column)
+    values = dict(zip(functions.names, functions.values))
     for (place, column, _), name in product(multiplied, hinges):
-        for wrong, right in permutations(("1", f"sin({name})", f"cos({name})"), 2):
-            change = functions[wrong] / functions[right] - 1.0
-            said = f"{wrong} for {right}"
-            said = f"{right} left out" if wrong == "1" else said
-            said = f"{wrong} too many" if right == "1" else said
+        for yours, other in permutations(("1", f"sin({name})", f"cos({name})"), 2):
+            change = values[yours] / values[other] - 1.0
+            said = f"{yours} for {other}"
+            said = f"{other} left out" if yours == "1" else said
+            said = f"{yours} too many" if other == "1" else said
             yield variant(2, "factor", place, "", said, search.right + change[:, None] * column)
 
 

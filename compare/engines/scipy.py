@@ -60,37 +60,24 @@ class ScipyDynamics(TmtQuantities, OneByOne):
         def slope(time: float, y: Array) -> Array:
             rates = rate(np.ascontiguousarray(y), torque)  # Radau gives columns of a matrix
             if not np.isfinite(rates).all():  # solve_ivp would try ever smaller steps without end
-                raise NotFinite(time)
+                raise FloatingPointError
             return rates
 
-        def run(times: Array = t) -> Any:  # SciPy's result, or NotFinite
+        def run() -> Any:  # SciPy's result; None of a motion that cannot be followed
             try:
-                span = 0.0, times[-1]
-                return solve_ivp(slope, span, course.start, course.method, t_eval=times, **options)
-            except NotFinite as error:
-                return error
+                return solve_ivp(slope, (0.0, t[-1]), course.start, course.method, t_eval=t, **options)
+            except FloatingPointError:
+                return None
 
         def read(solution: Any) -> Motion:
-            times = t
-            while isinstance(solution, NotFinite) and len(times) > 2:  # once more, as far as it goes
-                count = int(np.searchsorted(t, solution.time)) + 1
-                times = t[: max(2, min(len(times) - 1, count))]
-                solution = run(times)
             states, evaluations, why = course.start[None], 1, "its slope is not finite"
-            if not isinstance(solution, NotFinite):
+            if solution is not None:
                 states, evaluations = solution.y.T, int(solution.nfev)
                 why = why if solution.success else solution.message
             motion = course.motion(states, why)
             return motion._replace(q=of_length_1(self.coordinates, motion.q), evaluations=evaluations)
 
         return run, read
-
-
-class NotFinite(ArithmeticError):
-    """A slope that is not finite."""
-
-    def __init__(self, time: float):
-        self.time = time  # s
 
 
 def of_length_1(coordinates: Coordinates, q: Array) -> Array:

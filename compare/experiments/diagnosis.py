@@ -10,6 +10,7 @@ import numpy as np
 import tmt
 from tmt import literal
 
+from ..agreement.why import Asked, Why, of_accelerations
 from ..core.cause import Cause
 from ..core.check import Result
 from ..core.finding import Finding
@@ -19,6 +20,7 @@ from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import LeftOver
 from ..diagnosis.model import Equations, packed
 from ..engines import Dynamics
+from ..engines.mujoco.reading import tree_with_sites
 from ..engines.own import QUICK, OwnDynamics
 from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
@@ -29,12 +31,14 @@ from .setup import Setup
 
 EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",), states_causes=True, compares=False)
 SECONDS = 8.0  # of a search
+MOST_SAID = 3  # of causes that do the same
 POINTS = 61  # of a curve
 SECONDS_OF_CONDITIONS = 3.0
 # of Mbar and h at each state, that the conditions take, about: in all, and for each joint
 CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16
 OF_EQUATIONS = "M and h, largest difference over its tolerance"
 OF_ACCELERATIONS = "accelerations follow from M and h: force left over, over its tolerance"
+ACCELERATIONS_ALONE = "accelerations: force left over, over its tolerance"
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
 
 
@@ -80,11 +84,12 @@ class Found(NamedTuple):
     of_forces: tuple[Cause, ...]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
     curve: Curve | None  # of a user's own Mbar and h, where nothing explains their difference
+    alone: str | None = None  # what explains accelerations, if there is neither Mbar nor h
 
     @property
     def causes(self) -> list[Cause]:
-        """Of one rank each, those of Mbar and h first."""
-        return [*self.diagnosis.causes, *self.of_forces]
+        """The likeliest of Mbar and h, then those of accelerations."""
+        return [*self.diagnosis.causes[:MOST_SAID], *self.of_forces[:MOST_SAID]]
 
     @property
     def share(self) -> float:
@@ -97,7 +102,13 @@ def diagnosed(setup: Setup) -> Found:
     """What explains the difference of the engine that is compared with the robot's Tree; computed once."""
     tree, sample, engine = setup.robot.tree, setup.random.first(STATES_ASKED), setup.robot.compared[0]
     engine = "own" if engine == "own" else "mujoco"
+    if (
+        setup.reading is not None and tree == setup.reading.tree
+    ):  # its numbers are said in the frames of the file
+        tree = tree_with_sites(setup.reading)
     dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
+    if isinstance(dynamics, OwnDynamics) and not dynamics.has("mass_matrix"):
+        return of_accelerations_alone(dynamics, tree, sample)
     values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
     if isinstance(dynamics, OwnDynamics):
         broken, too_slow = conditions_of(dynamics, values)
@@ -113,6 +124,18 @@ def diagnosed(setup: Setup) -> Found:
     curve = telling_curve(dynamics, tree, values, right) if is_drawn else None
     forces = left_over.causes, left_over.ratio
     return Found(engine, len(q), broken, too_slow, diagnosis, ratio, *forces, curve)
+
+
+def of_accelerations_alone(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> Found:
+    """What explains a user's accelerations, if there is neither Mbar nor h."""
+    q, qd, tau = sample.q, sample.qd, sample.tau
+    qdd, equations = dynamics.acceleration(q, qd, tau), dynamics.equations
+    right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
+    ratio, why = LeftOver(tree, right, tau, qdd).ratio, Why()
+    if ratio > 1.0:
+        asked = Asked(tree, equations.coordinates, equations, Stated(equations.joints, "option"))
+        why = of_accelerations(asked, Values.of(tree, q, qd, None, None), tau, qdd)
+    return Found("own", len(q), [], False, Diagnosis(False), 0.0, why.causes, ratio, None, why.text)
 
 
 def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Values) -> Curve:
@@ -159,12 +182,14 @@ def rows(setup: Setup) -> DiagnosisResult:
     result = DiagnosisResult("diagnosis", nearest=found.diagnosis.nearest, curve=found.curve)
     for condition in found.conditions:
         check(result, found, condition)
-    is_known = found.diagnosis.differs or np.isfinite(found.ratio)
-    finding = result.finding("of_equations", found=found) if is_known else result.finding("no_numbers")
-    check(result, found, Condition(OF_EQUATIONS, found.ratio, 1.0, "", finding))
+    if found.alone is None:
+        is_known = found.diagnosis.differs or np.isfinite(found.ratio)
+        finding = result.finding("of_equations", found=found) if is_known else result.finding("no_numbers")
+        check(result, found, Condition(OF_EQUATIONS, found.ratio, 1.0, "", finding))
     is_known = np.isfinite(found.force_ratio)
     finding = result.finding("of_forces", found=found) if is_known else result.finding("no_numbers")
-    check(result, found, Condition(OF_ACCELERATIONS, found.force_ratio, 1.0, "", finding))
+    name = OF_ACCELERATIONS if found.alone is None else ACCELERATIONS_ALONE
+    check(result, found, Condition(name, found.force_ratio, 1.0, "", finding))
     names = [field.name for field in fields(CauseRow)]
     result.rows = [CauseRow(**{name: getattr(cause, name) for name in names}) for cause in found.causes]
     if found.too_slow:

@@ -12,23 +12,20 @@ from matplotlib.patheffects import withStroke
 
 from ..core.check import Result, largest_known
 from ..core.finding import Finding
-from ..judge.agree import AgreementResult
 from ..judge.scale import EPS, FACTOR
-from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH, zero_at_the_end
+from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
 
 SIZE = (4.2, 2.75)  # inches: about 400 px wide on the first screen
 LEAST_EPS, MOST_EPS = 1e-3, 1e6  # eps: where zero, and what is larger, is drawn
 MOST_ROWS = 9  # scenes or methods in one picture
 OUTLINE = [withStroke(linewidth=3, foreground="white")]  # of a text on lines
-# how each of the DISTANCES of judge.agree is drawn: label, colour, dash, mark, shift of its row
+# how each of the DISTANCES of judge.agree is drawn: label, colour, mark, shift of its row
 LOOKS = {
-    "difference": ("{} to MuJoCo", "black", "-", "D", -0.22),
-    "from_exact": ("{} to exact", BLUE, "--", "o", 0.0),
-    "mujoco_from_exact": ("MuJoCo to exact", ORANGE, "-.", "s", 0.22),
+    "difference": ("{} to MuJoCo", "black", "D", -0.22),
+    "from_exact": ("{} to exact", BLUE, "o", 0.0),
+    "mujoco_from_exact": ("MuJoCo to exact", ORANGE, "s", 0.22),
 }
 QUANTITIES = {"Mbar": "mass matrix M", "bias": "bias h", "qdd": "accelerations"}
-ZERO_AT = 1e-3  # eps: where differences of exactly zero are drawn
-MOST_DRAWN = 600  # points of a curve: more are not seen
 
 
 def chart(columns: int = 1, **options: Any) -> tuple[Figure, Any]:
@@ -84,7 +81,7 @@ def draw_agreement(results: Mapping[str, Result]) -> tuple[str, Figure, Finding]
     fig, ax = chart()
     farthest = 2e3 if all(passed) else MOST_EPS
     ax.set(xscale="log", xlim=(LEAST_EPS, farthest), xlabel="difference, eps × scale of the quantity")
-    for distance, (text, colour, _, mark, shift) in LOOKS.items():
+    for distance, (text, colour, mark, shift) in LOOKS.items():
         values = {place + shift: quantity[distance] for place, quantity in enumerate(quantities)}
         known = {place: value for place, value in values.items() if value is not None}
         if known:
@@ -106,46 +103,6 @@ def label_value(ax: Axes, value: float, row: float, colour: str) -> None:
     offset, ha, va = ((-6, 5), "right", "bottom") if value > 1e4 else ((6, 0), "left", "center")
     at = np.clip(value, *ax.get_xlim()), row
     ax.annotate(text, at, offset, textcoords="offset points", fontsize=8, color=colour, ha=ha, va=va)
-
-
-def draw_distances(result: AgreementResult, quantities: list[str]) -> tuple[str, Figure, Finding]:
-    """Cumulative distributions of the DISTANCES of judge.agree over random states."""
-    distances = {quantity: result.distances["random states"][quantity] for quantity in quantities}
-    columns = 2 if len(quantities) == 4 else min(3, len(quantities))
-    lines = -(-len(quantities) // columns)
-    fig = Figure(figsize=(WIDTH, 0.7 + 2.1 * lines), layout="constrained")
-    axes = fig.subplots(lines, columns, sharex=True, sharey=True, squeeze=False)
-    for ax, (quantity, measured) in zip(axes.flat, distances.items()):
-        for distance, ascending in measured.items():
-            text, colour, dash, *_ = LOOKS[distance]
-            look = {"color": colour, "linestyle": dash, "label": text.format(result.label)}
-            ax.step(*drawn(ascending), where="post", **look)
-        ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
-        ax.set(title=quantity, xscale="log", ylim=(0, 1.02))
-    for ax in axes.flat[len(quantities) :]:
-        ax.set_visible(False)
-    every = np.concatenate([values for measured in distances.values() for values in measured.values()])
-    zeros = bool((every <= ZERO_AT).any())
-    if zeros:
-        farthest = max(np.max(every[np.isfinite(every)], initial=0.0), FACTOR)
-        zero_at_the_end(axes[0, 0].xaxis, ZERO_AT, farthest, most=4 + 2 * (columns < 3))
-    for ax in axes[:, 0]:
-        ax.set_ylabel("share of states")
-    fig.supxlabel("difference, eps × scale of the quantity", fontsize=9)
-    fig.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
-    largest = {quantity: measured["difference"][-1] for quantity, measured in distances.items()}
-    largest = {quantity: np.inf if np.isnan(value) else float(value) for quantity, value in largest.items()}
-    furthest = max(quantities, key=lambda quantity: largest[quantity])
-    told = {"label": result.label, "worst": largest[furthest], "of_worst": furthest}
-    told |= {"exact": "from_exact" in distances[quantities[0]], "zero_at": ZERO_AT if zeros else None}
-    return f"{result.experiment}_distances", fig, result.finding("distances", of="shared", **told)
-
-
-def drawn(ascending: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At most MOST_DRAWN points of a cumulative distribution: values, and the share of states up to each."""
-    count = len(ascending)
-    points = np.unique(np.linspace(0, count - 1, min(count, MOST_DRAWN)).round().astype(int))
-    return np.maximum(ascending[points], ZERO_AT), (points + 1) / count
 
 
 def draw_nearest(nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figure, Finding]:

@@ -1,13 +1,12 @@
 """Positions, angular velocities, Jacobians and convective terms."""
 
 from ..core.check import Result
-from ..core.finding import Finding
 from ..robots import Robot
 from . import Experiment
-from .quantities import QUANTITIES, compared, figures, headline
+from .quantities import QUANTITIES, compared, headline
 from .setup import Setup
 
-__all__ = ["EXPERIMENT", "claim_values", "figures", "headline", "rows", "skipped"]
+__all__ = ["EXPERIMENT", "claim_values", "headline", "rows"]
 EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
 
 
@@ -15,10 +14,6 @@ def quantities(robot: Robot) -> list[str]:
     """The quantities that tmt's equations, or a user's own, give."""
     names = ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")
     return [name for name in names if not robot.own or QUANTITIES[name].function in robot.own]
-
-
-def skipped(robot: Robot) -> Finding | None:
-    return None if quantities(robot) else Finding("kinematics", "nothing_given")
 
 
 def claim_values(robot: Robot) -> dict[str, list[str]]:

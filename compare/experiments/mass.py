@@ -6,10 +6,10 @@ from ..core.check import Result
 from ..judge.agree import over
 from ..judge.scale import EPS, FACTOR
 from . import Experiment
-from .quantities import compared, figures, headline, overview
+from .quantities import compared, headline, overview
 from .setup import Setup
 
-__all__ = ["EXPERIMENT", "figures", "headline", "overview", "rows"]
+__all__ = ["EXPERIMENT", "headline", "overview", "rows"]
 EXPERIMENT = Experiment(
     order=40, asks_of_own=("mass_matrix",), options=("--joints",), diagnosed=True, overview="agreement"
 )

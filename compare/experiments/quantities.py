@@ -1,6 +1,6 @@
 """The quantities that both engines give at a state, one row each, and their comparison over samples.
 
-The experiments at single states share their figures, headline and first screen too: those of this module.
+The experiments at single states share their headline and first screen too: those of this module.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ from ..core.finding import Finding
 from ..core.text import say
 from ..engines import LABELS
 from ..engines.tmt import Compiled
-from ..judge.agree import AgreementResult, agree
+from ..judge.agree import agree
 from ..judge.entries import Entries, unit
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
@@ -75,7 +75,7 @@ QUANTITIES = {
 class Comparison:
     """Two engines, at random states also tmt's compiled functions: each function is called once."""
 
-    def __init__(self, setup: Setup, result: AgreementResult, sample: Sample):
+    def __init__(self, setup: Setup, result: Result, sample: Sample):
         self.sample, self.robot = sample, setup.robot
         self.engines: list[Any] = [*setup.compared().values()]  # Dynamics that know more, MuJoCo second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
@@ -112,9 +112,9 @@ class Comparison:
             self.agree(f"{name}, compiled", units, of_code, mujoco_values, scale)
 
 
-def compared(setup: Setup, experiment: str, *names: str) -> tuple[AgreementResult, list[Comparison]]:
+def compared(setup: Setup, experiment: str, *names: str) -> tuple[Result, list[Comparison]]:
     """The result of an experiment that compares these quantities at named postures and random states."""
-    result = AgreementResult(experiment, label=LABELS[setup.robot.compared[0]])
+    result = Result(experiment, label=LABELS[setup.robot.compared[0]])
     comparisons = [Comparison(setup, result, sample) for sample in (setup.named, setup.random)]
     for comparison in comparisons:
         for name in names:
@@ -140,19 +140,12 @@ def check_wide(result: Result, comparisons: Sequence[Comparison]) -> None:
         result.not_judged("all states", "qdd", say(reason))
 
 
-def headline(result: AgreementResult) -> Finding | None:
+def headline(result: Result) -> Finding | None:
     """The difference with the largest share of its tolerance; one that is not a number comes first."""
     shares = [np.inf if row.worst_difference is None else row.difference_over_bar for row in result.rows]
     known = [(share, row) for share, row in zip(shares, result.rows) if share is not None]
     _, top = max(known, key=lambda pair: pair[0], default=(None, None))
     return Finding("shared", "agreement_headline", {"row": top}) if top else None
-
-
-def figures(result: AgreementResult, robot: Robot) -> Iterator[Drawing]:
-    from .figures import draw_distances  # matplotlib is for the process that draws
-
-    drawn = [name for name in QUANTITIES if name in result.distances["random states"]]
-    yield partial(draw_distances, result, drawn)
 
 
 def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[Drawing]:

@@ -1,6 +1,6 @@
 """The comparison of two engines' values over states: the one closest to its tolerance."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,7 +26,6 @@ SHOWN = (  # fields of a comparison in a report; its file has all
 class AgreementRow(Row):
     """One quantity over the states of a sample; the column of `from_exact` is named after the engine."""
 
-    SHARE = "difference_over_bar"
     engine: str
     scene: str
     quantity: str
@@ -54,16 +53,8 @@ class AgreementRow(Row):
         return {named_after_engine.get(name, name): field for name, field in columns.items()}
 
 
-@dataclass
-class AgreementResult(Result):
-    """The result of an experiment that compares two engines at states."""
-
-    # by sample and quantity: the arrays of DISTANCES that are known, ascending
-    distances: dict[str, dict[str, dict[str, np.ndarray]]] = field(default_factory=dict)
-
-
 def agree(
-    result: AgreementResult, sample: Sample, quantity: str, unit: str, values: ArrayLike, mujoco_values: ArrayLike,
+    result: Result, sample: Sample, quantity: str, unit: str, values: ArrayLike, mujoco_values: ArrayLike,
     scale: ArrayLike, exact: "Pairs | None" = None,
 ) -> None:  # fmt: skip
     """Add a row and a check: the difference between two engines that is closest to its tolerance, 64 eps x scale.
@@ -77,16 +68,14 @@ def agree(
             measured[f"{quantity}, {engine} to exact"] = distance_from_exact(exact, of_engine, scale)
     checks = [check_closest(result, sample, name, unit, *pair) for name, pair in measured.items()]
     (check, worst), (difference, scales) = checks[0], measured[quantity]
-    in_eps = (np.sort(over(sizes, EPS * of_sizes)) for sizes, of_sizes in measured.values())
-    distances = dict(zip(DISTANCES, in_eps))
-    result.distances.setdefault(sample.name, {})[quantity] = distances
+    in_eps = (float(np.max(over(sizes, EPS * of_sizes))) for sizes, of_sizes in measured.values())
     row = AgreementRow(
         engine=result.label, scene=sample.name, quantity=quantity, unit=unit, states=len(sample.q),
         largest_difference=float(difference.max()) if np.isfinite(difference).all() else None,
         worst_difference=check.value, bar=check.tolerance, difference_over_bar=check.over_tolerance,
         scale=float(scales[worst]), exact_states=None if exact is None else len(exact.high), worst_state=check.note,
         worst_q=in_full(sample.q[worst]), worst_qd=in_full(sample.qd[worst]), worst_tau=in_full(sample.tau[worst]),
-        passed=check.passed, **{name: float(in_order[-1]) for name, in_order in distances.items()},
+        passed=check.passed, **dict(zip(DISTANCES, in_eps)),
     )  # fmt: skip
     result.rows.append(row)
     result.shown = [name for name, (field, _) in row.columns().items() if field in SHOWN]

@@ -36,7 +36,7 @@ JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "fre
 
 class Picture(NamedTuple):
     figure: Figure  # of the first screen
-    link: str  # to a figure, or to a section
+    link: str  # to a section
     title: str
     alternative: str
     fails: bool  # whether something fails in what it shows
@@ -49,7 +49,6 @@ class Listing(NamedTuple):
     rows: pd.DataFrame | None  # None: its file alone has them
     name: str = ""  # of its file
     title: str = ""
-    which: str = ""  # how many of how many are shown, if not all
 
 
 class Document:
@@ -130,14 +129,14 @@ class Document:
                     title, alternative = (
                         block(section.name, f"overview_{x}") for x in ("title", "alternative")
                     )
-                    pictures.append(Picture(figure, link_to(group), title, alternative, fails))
+                    pictures.append(Picture(figure, section.name, title, alternative, fails))
         if not self.page:
             return pictures
-        failing = [(section, figure) for section in wrong for figure in linked([section])]
+        failing = [(section, figure) for section in wrong for figure in section.own_figures]
         if failing and not any(picture.fails for picture in pictures):
             section, figure = failing[0]
             without_caption = figure._replace(caption="")
-            pictures.append(Picture(without_caption, link_to([section]), section.title, figure.caption, True))
+            pictures.append(Picture(without_caption, section.name, section.title, figure.caption, True))
         return sorted(pictures, key=lambda picture: not picture.fails)
 
     def introduction(self) -> str:
@@ -151,7 +150,7 @@ class Document:
         not_judged = [check for check in checks if not check.judged]
         figures = section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
-        first = [figure for figure in figures if figure in first or figure.is_main or figure.moves]
+        first = [figure for figure in figures if figure in first or figure.moves]
         lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
@@ -164,24 +163,12 @@ class Document:
         is_main = self.page or name == section.name or name in MAIN_TABLES
         if columns == [] or name in section.result.filed or not is_main:
             return Listing(len(rows), None, name, title)
-        few, which = tables.shortened(rows, MOST_ROWS if self.page else MOST_IN_MARKDOWN)
-        return Listing(len(rows), tables.of_rows(few, columns), name, title, which)
+        few = rows[: MOST_ROWS if self.page else MOST_IN_MARKDOWN]
+        return Listing(len(rows), tables.of_rows(few, columns), name, title)
 
 
 def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:
     return Listing(len(checks), tables.of_checks(checks[:most], columns))
-
-
-def linked(sections: Sequence[Section]) -> list[Figure]:
-    """The figures behind a picture: first those of distances or limits."""
-    figures = [figure for section in sections for figure in section.own_figures]
-    return sorted(figures, key=lambda figure: not figure.is_main)
-
-
-def link_to(sections: Sequence[Section]) -> str:
-    """The anchor of the figure behind a picture, or of the last section."""
-    figures = linked(sections)
-    return f"figure-{figures[0].file}" if figures else sections[-1].name
 
 
 def joints_of(robot: Robot) -> list[str]:

@@ -54,13 +54,6 @@ def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> pd.Dat
     return of_records(records, dict.fromkeys(columns, Column()))
 
 
-def shortened(rows: Sequence[Row], most: int) -> tuple[list[Row], str]:
-    """The most urgent rows, at most `most`, in their order; how many of how many ('' if all of them)."""
-    which = f"{most} of {len(rows):,} rows" if len(rows) > most else ""
-    numbers = sorted(range(len(rows)), key=lambda number: rows[number].urgency)
-    return [rows[number] for number in sorted(numbers[:most])], which
-
-
 def of_origin(origin: Mapping[str, Any]) -> pd.DataFrame:
     rows = [[IN_WORDS.get(name, name), in_one_cell(value)] for name, value in origin.items()]
     return pd.DataFrame(rows, columns=["what", "value"])

@@ -36,11 +36,6 @@ class Figure(NamedTuple):
         """Whether it is a picture of the first screen."""
         return self.file.startswith(OVERVIEW)
 
-    @property
-    def is_main(self) -> bool:
-        """Whether a picture of the first screen leads to it."""
-        return self.file.endswith(("_distances", "_limits"))
-
 
 @dataclass
 class Section:

@@ -12,7 +12,7 @@ from ..core.errors import Refused
 from ..core.finding import Finding
 from ..core.text import block, say
 from ..engines.mujoco import ModelError
-from ..engines.own.own_file import OwnFileError
+from ..engines.own import OwnError
 from ..experiments import EXPERIMENTS, skipped
 from ..process.streams import say_error
 from ..process.workers import WorkerEnded, load_modules, start_workers
@@ -46,7 +46,7 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
             raise Refused(block("run", "does_not_apply", **about))
         with new_report(options.out) as folder:
             report, parts = compute(options, command, compared, folder, terminal)
-    except (ModelError, OwnFileError, SceneError, WorkerEnded) as error:
+    except (ModelError, OwnError, SceneError, WorkerEnded) as error:
         raise Refused(error) from None
     good = report.passed and not parts.broken
     terminal.say()

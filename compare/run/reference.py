@@ -16,7 +16,7 @@ from ..engines.mujoco import ModelError, Mujoco, Reading, Source, engine, has_hi
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.parameters import of_source, of_welded, remarks
 from ..engines.own import Own, OwnEquations, OwnError
-from ..engines.own.own_file import OwnFileError, aside, own_object, raised_in
+from ..engines.own.own_file import aside, own_object, raised_in
 from ..experiments.setup import Request
 from ..robots import Robot
 from ..robots.actuators import Drive
@@ -118,7 +118,7 @@ def compared_with(
     joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
     solution: the path of the solution, if not `reference`; floating: the base of a URDF has a free joint.
     ModelError, in one line, for a file that cannot be compared, JointsDiffer for different joints,
-    OwnFileError for equations that cannot be used.
+    OwnError for equations that cannot be used.
     """
     source, shown = Source(Path(path or ARM.mjcf), floating), in_one_line(shown or path or "mjcf/arm.xml")
     if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
@@ -187,7 +187,7 @@ def bodies_on(reading: Reading, names: Sequence[str]) -> Counter[str]:
 
 
 def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
-    """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once; or OwnFileError."""
+    """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once; or OwnError."""
     source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
     try:
@@ -196,7 +196,7 @@ def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None)
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
     except JointsError as error:
-        raise OwnFileError(f"--joints: {error}") from None
+        raise OwnError(f"--joints: {error}") from None
     except OwnError as error:
-        raise OwnFileError(f"{reference.rstrip(':')}: {error}") from None
+        raise OwnError(f"{reference.rstrip(':')}: {error}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))

@@ -32,7 +32,8 @@ COUNT = 20
 
 @pytest.mark.parametrize("language, options", [
     ("c", []), ("c", ["--float"]), ("python", []), ("casadi", []), ("jax", []),
-    ("matlab", ["--quantity", "mass_matrix,bias,jacobians"]),
+    ("python", ["--quantity", "mass_matrix,bias,gravity_balance,derivatives"]),  # an entry of dtau/dqd is zero
+    ("matlab", ["--quantity", "mass_matrix,bias,jacobians,derivatives"]),
 ])  # fmt: skip
 def test_the_arm_in_a_language(language, options, tmp_path, capsys):
     if not NEEDS[language]:
@@ -197,7 +198,7 @@ def test_values_are_compared_with_mujoco_and_with_the_exact_value(from_mujoco, t
     assert not row.passed and (row.of_mujoco > 1.0, row.of_exact > 1.0) == (from_mujoco, not from_mujoco)
 
 
-@pytest.mark.parametrize("language", [name for name in ("c", "python") if NEEDS[name]])
+@pytest.mark.parametrize("language", [name for name in ("c", "python", "matlab") if NEEDS[name]])
 def test_parameters_are_compared_with_the_file_that_has_other_values(language, tmp_path, capsys):
     """And what MuJoCo has not, with the exact values alone."""
     words = ["--parameters", "payload,rod,gravity", "--quantity", "bias,inverse_dynamics,frame_pose:rod"]
@@ -207,7 +208,7 @@ def test_parameters_are_compared_with_the_file_that_has_other_values(language, t
     assert main(["equations", *words]) == 0
     shown = capsys.readouterr().out
     assert all(text in shown for text in ("bias (p)", "frame_pose:rod (p)", "not compared"))
-    text = next((tmp_path / "out").glob("swing.[hp]*")).read_text(encoding="utf-8")
+    text = next((tmp_path / "out").glob("swing.[hpm]*")).read_text(encoding="utf-8")
     assert "payload_inertia" in text and "centre of mass of payload in the frame of rod" in text
 
 

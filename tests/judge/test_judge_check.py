@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from compare.core.check import Result
-from compare.judge.agree import AgreementResult, agree, closest, worst_of_each
+from compare.judge.agree import agree, closest, worst_of_each
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 from tmt.exact.many import Pairs
@@ -20,7 +20,7 @@ def sample(states=4, exact=2):
 
 def agreed(ours, theirs, scale, exact=None):
     """The checks and the row of one quantity, (states, ...)."""
-    result, states = AgreementResult("mass"), sample(len(ours), exact=0 if exact is None else 2)
+    result, states = Result("mass"), sample(len(ours), exact=0 if exact is None else 2)
     exact = np.zeros((0, 1)) if exact is None else np.array(exact)[:, None]
     agree(result, states, "Mbar", "kg m2", ours, theirs, scale, Pairs(exact, 0.0 * exact))
     return result.checks, result.rows[0]

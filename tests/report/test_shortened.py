@@ -1,4 +1,4 @@
-"""Which rows of a long table are shown, and how long report.md becomes."""
+"""How a table is shown, and how long report.md becomes."""
 
 import math
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from compare.robots.arm import ARM
 
 @dataclass(kw_only=True)
 class Compared(Row):
-    """A row of a table whose rows may fail, differ from a stated number, or use a share of a tolerance."""
+    """A row of a table."""
 
     at: int
     share: float = 0.0
@@ -25,25 +25,9 @@ class Compared(Row):
     names: str = column(names=True, default="x" * 99)
     unknown: float | None = column(optional=True)
 
-    @property
-    def urgency(self):
-        return self.passed, not self.difference, -self.share
-
 
 def runs(count):
     return [Compared(at=k, share=0.01 * k) for k in range(count)]
-
-
-def kept(rows, most):
-    return [row.at for row in tables.shortened(rows, most)[0]]
-
-
-def test_rows_that_fail_or_differ_are_shown_then_the_largest_shares_of_a_tolerance_in_their_order():
-    rows = runs(12)
-    assert tables.shortened(rows, 12) == (rows, "") and tables.shortened(rows, 3)[1] == "3 of 12 rows"
-    assert kept(rows, 3) == [9, 10, 11]
-    rows[3].passed, rows[5].difference = False, 1e-9
-    assert kept(rows, 3) == [3, 5, 11] and kept(rows, 1) == [3]
 
 
 def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
@@ -78,7 +62,7 @@ def test_a_small_report_md_is_whole_and_names_are_no_markup_in_it():
     of = section("trajectory", GOOD, rows=runs(405), what_should_i_use=[{"b": 1.25, "of": "<script> | b"}])
     of.result.notes = [*(f"Note {k}." for k in range(11)), "In `<option>`, 1 < 2 and a<b."]
     text = text_of(of)
-    assert "6 of 405" in text and "| 404 |" in text and "| 398 |" not in text and "| 1.25 |" in text
+    assert "6 of 405" in text and "| 5 |" in text and "| 6 |" not in text and "| 1.25 |" in text
     assert all(f"- Note {k}." in text for k in range(11))
     assert "&lt;script&gt; &#124; b" in text and "**Worst in &lt;i&gt;.**" in text
     of.result.filed = ("what_should_i_use",)  # in its file alone

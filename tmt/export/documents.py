@@ -1,11 +1,21 @@
-"""Symbolic equations as a LaTeX document, and as an HTML page with MathML."""
+"""Symbolic equations as a LaTeX document, and as an HTML page with MathML; the formulas are written by SymPy's printers."""
 
 import html
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+from xml.dom.minidom import parseString
 
-from .formulas import Formula, Token, introduction, sections, tables
-from .symbols import Symbolic
+import sympy
+from sympy.printing.mathml import MathMLPresentationPrinter
+
+from .symbols import TITLES, Symbolic
+from .trigonometry import Expression
+
+WIDTH = 75  # characters of a matrix that fit on a line
+DIGITS = 6
+Row = tuple[str, ...]
+Display = Mapping[Expression, str]
 
 LATEX = r"""% {comment}
 \documentclass[10pt]{article}
@@ -47,16 +57,86 @@ pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; 
 """
 
 
+class Section(NamedTuple):
+    """A quantity: its symbol, what it is, and its entries."""
+
+    letter: str
+    title: str
+    rows: list[list[Expression]]
+
+    @property
+    def heading(self) -> str:
+        return self.title[0].upper() + self.title[1:]
+
+    @property
+    def fits(self) -> bool:
+        """Whether it is short enough to be shown as a matrix."""
+        columns = list(zip(*self.rows))
+        widths = [max(len(re.sub("_[a-z]*", "_", str(entry))) for entry in column) for column in columns]
+        return len(columns) > 1 and sum(widths) + 4 * len(columns) <= WIDTH
+
+    @property
+    def labelled(self) -> list[tuple[str, Expression]]:
+        """Entries with their names: those of a symmetric matrix from the diagonal on."""
+        n = len(self.rows)
+        if len(self.rows[0]) == 1:
+            return [(f"{self.letter}_{{{i + 1}}}", self.rows[i][0]) for i in range(n)]
+        comma = "," if n > 9 else ""
+        upper = [(i, j) for i in range(n) for j in range(i, n)]
+        return [(f"{self.letter}_{{{i + 1}{comma}{j + 1}}}", self.rows[i][j]) for i, j in upper]
+
+
+def sections(symbolic: Symbolic) -> list[Section]:
+    """All quantities, numbers with six digits; a bias refers to gravity by its symbol."""
+    result = []
+    for name, matrix in symbolic.entries.items():
+        rows = matrix.tolist()
+        if name == "bias" and "gravity_balance" in symbolic.entries:
+            gravity = symbolic.entries["gravity_balance"]
+            rows = [
+                [h - G + symbol if G else h] for (h,), G, symbol in zip(rows, gravity, of_gravity(gravity))
+            ]
+        rows = [[entry.xreplace(rounded(entry)) for entry in row] for row in rows]
+        result.append(Section(*TITLES[name], rows))
+    return result
+
+
+def of_gravity(entries: Sequence[Expression]) -> list[Expression]:
+    return [sympy.Symbol(f"G_{{{i + 1}}}") for i in range(len(entries))]
+
+
+def rounded(expression: Expression) -> dict[Expression, Expression]:
+    return {number: sympy.Float(number, DIGITS) for number in expression.atoms(sympy.Float)}
+
+
+def tables(symbolic: Symbolic) -> list[list[Row]]:
+    """Rows of joints (symbol, meaning), and of parameters (symbol, value, unit, meaning); no empty table."""
+    joints: list[Row] = [(symbolic.display[q], text) for q, text in zip(symbolic.q, symbolic.joints)]
+    parameters: list[Row] = [
+        (symbolic.display[symbol], f"{row.value:.6g}", row.unit.replace("2", "²"), row.meaning)
+        for symbol, row in symbolic.parameters.items()
+    ]
+    return [rows for rows in (joints, parameters) if rows]
+
+
+def introduction(symbolic: Symbolic) -> str:
+    quantities = "; ".join(": ".join(TITLES[name]) for name in symbolic.entries)
+    note = [f"{symbolic.note[0].upper()}{symbolic.note[1:]}."] if symbolic.note else []
+    fixed = ["Forces of dampers D and springs K are not in h.", "Numbers are shown with six digits."]
+    return " ".join([f"{quantities}.", *fixed, *note])
+
+
 def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """A LaTeX document (article, amsmath): head_lines as comments, symbols, parameters, each quantity."""
-    equations = []
+    equations, display = [], symbolic.display
     for section in sections(symbolic):
         equations.append(rf"\medskip\textbf{{{escaped(section.heading)}}}")
         if section.fits:
-            body = r" \\ ".join(" & ".join(map(in_latex, row)) for row in section.rows)
+            body = r" \\ ".join(" & ".join(in_latex(entry, display) for entry in row) for row in section.rows)
             equations.append(rf"\[ {section.letter} = \begin{{pmatrix}} {body} \end{{pmatrix}} \]")
         else:
-            equations += [rf"\entry{{{name} = {in_latex(formula)}}}" for name, formula in section.labelled]
+            for name, entry in section.labelled:
+                equations.append(rf"\entry{{{name} = {in_latex(entry, display)}}}")
     parts = {
         "comment": "\n% ".join(head_lines),
         "text": f"$${MOTION}$$\n{escaped(introduction(symbolic))}",
@@ -66,14 +146,12 @@ def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     return re.sub(r"\{(comment|text|tables|equations)\}", lambda found: parts[found[1]], LATEX)
 
 
-def in_latex(formula: Formula) -> str:
-    parts = []
-    for token in formula:
-        text = rf"\{token.text}" if token.kind == "function" else token.text
-        if token.kind == "number":
-            text = re.sub(r"e([+-]\d+)", lambda found: rf" \cdot 10^{{{int(found[1])}}}", text)
-        parts.append(f"{text}^{{{token.power}}}" if token.power else text)
-    return " ".join(parts) or "0"
+def in_latex(expression: Expression, display: Display) -> str:
+    """A formula in which a line may break, within brackets too."""
+    text: str = sympy.latex(
+        expression, symbol_names=dict(display), fold_func_brackets=True, long_frac_ratio=2
+    )
+    return re.sub(r"\\(left|right)(?=[()])", "", text)
 
 
 def escaped(text: str) -> str:
@@ -92,15 +170,18 @@ def tabular(rows: Sequence[Sequence[str]]) -> str:
 
 def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     """An HTML page with MathML that needs no network: what `latex` shows."""
-    equations = []
+    equations, printer = [], Printer(symbolic.display)
     for section in sections(symbolic):
         equations.append(f"<h2>{html.escape(section.heading)}</h2>")
         if section.fits:
-            rows = "".join(map(matrix_row, section.rows))
+            cells = ["".join(f"<mtd>{printer.doprint(entry)}</mtd>" for entry in row) for row in section.rows]
+            rows = "".join(f"<mtr>{row}</mtr>" for row in cells)
             matrix = f"<mi>{section.letter}</mi><mo>=</mo><mo>(</mo><mtable>{rows}</mtable><mo>)</mo>"
             equations.append(f"<p><math>{matrix}</math></p>")
         else:
-            equations += [entry(Token(name), formula) for name, formula in section.labelled]
+            for name, entry in section.labelled:
+                label = f"<math>{in_mathml(name)}<mo>=</mo></math>"
+                equations.append(f'<p class="entry">{label} {printer.in_lines(entry)}</p>')
     return HTML.format(
         lines=html.escape("\n".join(head_lines)),
         text=html.escape(introduction(symbolic)),
@@ -109,56 +190,43 @@ def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
     )
 
 
-def entry(name: Token, formula: Formula) -> str:
-    return f'<p class="entry"><math>{in_mathml(name)}<mo>=</mo></math> {in_lines(formula)}</p>'
+class Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types
+    """MathML with the symbols of the documents."""
+
+    def __init__(self, display: Display):
+        super().__init__()
+        self.display = display
+
+    def _print_Symbol(self, symbol: Expression) -> Any:
+        return parseString(in_mathml(self.display.get(symbol, symbol.name))).documentElement
+
+    def doprint(self, expression: Expression) -> str:
+        """Brackets are those that browsers show: mfenced, which SymPy 1.12 writes, is none."""
+        text: str = super().doprint(expression)
+        return text.replace("<mfenced>", "<mrow><mo>(</mo>").replace("</mfenced>", "<mo>)</mo></mrow>")
+
+    def in_lines(self, expression: Expression) -> str:
+        """A sum in pieces between which a line may be broken."""
+        pieces = ""
+        for term in expression.as_ordered_terms():
+            minus = term.could_extract_minus_sign()
+            sign = "\N{MINUS SIGN}" if minus else "+" if pieces else ""
+            sign = f"<mo>{sign}</mo>" if sign else ""
+            pieces += f"<math>{sign}{self.doprint(-term if minus else term)}</math><wbr>"
+        return pieces.removesuffix("<wbr>")
 
 
 def table(rows: Sequence[Sequence[str]]) -> str:
     lines = []
     for symbol, *texts in rows:
-        cells = [f"<math>{in_mathml(Token(symbol))}</math>", *map(html.escape, texts)]
+        cells = [f"<math>{in_mathml(symbol)}</math>", *map(html.escape, texts)]
         lines.append(f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>")
     return f"<table>{''.join(lines)}</table>"
 
 
-def matrix_row(entries: Sequence[Formula]) -> str:
-    return f"<mtr>{''.join(f'<mtd>{mathml(formula)}</mtd>' for formula in entries)}</mtr>"
-
-
-def mathml(formula: Formula) -> str:
-    """A formula with a narrow space between factors."""
-    text = ""
-    for token, before in zip(formula, [Token("", "open"), *formula]):
-        factors = token.kind not in ("operator", "close") and before.kind not in ("operator", "open")
-        text += "<mspace width='0.17em'/>" * factors + in_mathml(token)
-    return f"<mrow>{text or '<mn>0</mn>'}</mrow>"
-
-
-def in_lines(formula: Formula) -> str:
-    """A formula in pieces that end where a line may be broken: before an operator."""
-    pieces: list[Formula] = [[]]
-    for token in formula:
-        if token.kind == "operator" and pieces[-1]:
-            pieces.append([])
-        pieces[-1].append(token)
-    return "<wbr>".join(f"<math>{mathml(piece)}</math>" for piece in pieces)
-
-
-def in_mathml(token: Token) -> str:
-    """A token; symbols are read from their LaTeX, such as \\dot{q}_{1}."""
-    if token.kind == "symbol":
-        dot, name, index = re.findall(r"^(\\dot)?[{\\]*(\w+?)}?(?:_\{?(.*?)\}?)?$", token.text)[0]
-        text = f"<mi>{f'&{name};' if len(name) > 1 else name}</mi>"
-        text = f'<mover accent="true">{text}<mo>˙</mo></mover>' if dot else text
-        text = f"<msub>{text}<mrow><mi mathvariant='normal'>{index}</mi></mrow></msub>" if index else text
-    elif token.kind == "function":
-        text = f"<mi>{token.text}</mi>"
-    elif token.kind == "number":
-        number, _, power = token.text.partition("e")
-        text = f"<mn>{number}</mn>"
-        text += f"<mo>·</mo><msup><mn>10</mn><mn>{int(power)}</mn></msup>" if power else ""
-    else:
-        space = 0.25 * (token.kind == "operator")
-        sign = token.text.replace("-", "\N{MINUS SIGN}")
-        text = f'<mo stretchy="false" lspace="{space}em" rspace="{space}em">{sign}</mo>'
-    return f"<msup>{text}<mn>{token.power}</mn></msup>" if token.power else text
+def in_mathml(symbol: str) -> str:
+    """A symbol, read from its LaTeX, such as \\dot{q}_{1}."""
+    dot, name, index = re.findall(r"^(\\dot)?[{\\]*(\w+?)}?(?:_\{?(.*?)\}?)?$", symbol)[0]
+    text = f"<mi>{html.unescape(f'&{name};') if len(name) > 1 else name}</mi>"
+    text = f'<mover accent="true">{text}<mo>˙</mo></mover>' if dot else text
+    return f"<msub>{text}<mrow><mi mathvariant='normal'>{index}</mi></mrow></msub>" if index else text

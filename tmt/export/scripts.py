@@ -31,7 +31,7 @@ NOTE = (
     "of a result of three dimensions the matrices are one below the other."
 )
 COLUMNS = (
-    "States are columns: q (nq, N), qd and tau (nv, N). "
+    "States are columns: q (nq, N), qd and tau (nv, N); what is the same for all may be one column. "
     "The last dimension of each result is that of the states."
 )
 
@@ -104,7 +104,8 @@ def matlab(program: Program) -> str:
 def matlab_function(function: Function) -> str:
     takes, results, sizes, dimensions = function.takes, function.results, function.sizes, len(function.shape)
     lines = [f"assert(size({x}, 1) == {sizes[x]}, '{x} has {sizes[x]} rows');" for x in takes]
-    lines += [f"{result} = zeros({function.size}, size({takes[-1]}, 2));" for result in results]
+    lines.append(f"N = max([{', '.join(f'size({x}, 2)' for x in takes)}]);")
+    lines += [f"{result} = zeros({function.size}, N);" for result in results]
     lines += [line.text for line in statements(function, MATLAB)]
     if dimensions > 1:  # stored by rows
         shape = ", ".join(map(str, reversed(function.shape)))

@@ -6,17 +6,17 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import reduce
 
 from sympy import Add, Integer, Mul, Rational, cos, gcd, sin
+from sympy.simplify.fu import TR8
 
 from tmt.derivation.vectors import Scalar
 
 from .names import Names
 from .names import number as exact_number
-from .trigonometry import NOISE, OF_TERM, Expression, Polynomial, Ring
+from .trigonometry import OF_TERM, Expression, Polynomial, Ring
 
 FEW_TERMS, FEW_FACTORED = 40, 6  # of a polynomial of which every form is tried, of one that is factored
 
 Term = tuple[Expression, dict[Expression, Expression]]  # of a sum: a number, {factor: power}
-Harmonics = dict[tuple[bool, tuple[int, ...]], Scalar]  # {(is_sine, k): number}, of sums of k_i times angle i
 
 
 class Forms:
@@ -63,7 +63,8 @@ class Forms:
             self.ring.count(len(poly) * OF_TERM)
             pairs = [pair[::-1] for pair, turn in zip(squared, turned) if turn]
             yield from self.expressions(self.ring.reduced(poly, pairs))
-        yield self.of_harmonics(self.harmonics(poly))
+        self.ring.count(len(poly) * OF_TERM)
+        yield TR8(self.expression(poly).expand()).expand()  # products of sines and cosines as sums
 
     def expressions(self, poly: Polynomial) -> Iterator[Expression]:
         """A polynomial with its common factors taken out, and as a product of polynomials."""
@@ -88,40 +89,6 @@ class Forms:
         if self.ring.exact:
             return Rational(int(value.numerator), int(value.denominator))
         return exact_number(float(value))
-
-    def harmonics(self, poly: Polynomial) -> Harmonics:
-        """A polynomial as a sum of sines and cosines of sums of angles."""
-        result: Counter[tuple[bool, tuple[int, ...]]] = Counter()
-        for monomial, number in poly.items():
-            sines = sum(monomial[place] for place, _ in self.ring.places)
-            # of exp(i k q), divided by i where the number of sines is odd
-            parts: dict[tuple[int, ...], Scalar] = {(): number * (-1) ** (sines // 2)}
-            for s, c in self.ring.places:
-                waves = self.waves(monomial[s], monomial[c]).items()
-                parts = {(*k, more): part * share for k, part in parts.items() for more, share in waves}
-            for k, part in parts.items():
-                sign = next((1 if x > 0 else -1 for x in k if x), 1)
-                result[sines % 2 == 1, tuple(sign * x for x in k)] += part * (sign if sines % 2 else 1)
-        least = 0 if self.ring.exact else NOISE * max(map(abs, result.values()), default=0)
-        return {harmonic: number for harmonic, number in result.items() if abs(number) > least}
-
-    def waves(self, sines: int, cosines: int) -> dict[int, Scalar]:
-        """(i sin q)^sines (cos q)^cosines as {k: factor of z^k}: 2 i sin q = z - 1/z, 2 cos q = z + 1/z."""
-        waves: dict[int, Scalar] = {0: self.ring.ring.domain.one}
-        for sign in [-1] * sines + [1] * cosines:
-            turned: dict[int, Scalar] = Counter()
-            for k, part in waves.items():
-                turned[k + 1] += part / 2
-                turned[k - 1] += sign * part / 2
-            waves = turned
-        return waves
-
-    def of_harmonics(self, harmonics: Harmonics) -> Expression:
-        terms = []
-        for (is_sine, k), number in harmonics.items():
-            angle = Add(*map(Mul, k, self.angles))
-            terms.append(self.number(number) * (sin(angle) if is_sine else cos(angle)))
-        return Add(*terms)
 
 
 def cost(form: Expression) -> int:

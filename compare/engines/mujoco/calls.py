@@ -17,7 +17,6 @@ from .dynamics import MujocoDynamics
 from .names import bit
 
 Run = Callable[[int], None]  # how many times
-TINY_STEP = 1e-9  # s: a loop of steps stays where it starts
 
 
 def library() -> str | None:
@@ -31,7 +30,7 @@ class MinimalCalls:
 
     def __init__(self, dynamics: MujocoDynamics):
         self.qpos, self.dofs = dynamics.qpos, dynamics.dofs
-        self.model, self.data = dynamics.own_copy(TINY_STEP, "RK4")
+        self.model, self.data = dynamics.own_copy(1.0, "RK4")
         self.model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
         self.force, self.solution = np.zeros((2, self.model.nv))
 
@@ -39,8 +38,8 @@ class MinimalCalls:
     def unavailable() -> str | None:
         return None if library() else "MuJoCo's library was not found in its package"
 
-    def loops(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> dict[str, tuple[str, Run]]:
-        """For each way: (quantity, run(count)), where run repeats it count times at one state.
+    def loops(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> dict[str, Run]:
+        """For each way run(count), which repeats it count times at one state.
 
         q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work is only what
         forward dynamics needs; it solves M a = h, without any torque.
@@ -59,17 +58,11 @@ class MinimalCalls:
 
             return repeat
 
-        def called(count: int) -> None:
-            for _ in range(count):
-                mujoco.mj_forward(self.model, self.data)
-
         mass_matrix = "mj_makeM" if hasattr(ctypes.CDLL(path), "mj_makeM") else "mj_crb"
         before, after = ("mj_kinematics", "mj_comPos", mass_matrix), ("mj_comVel", "mj_rne")
         return {
-            "MuJoCo, mj_forward called from Python": ("forward_dynamics", called),
-            "MuJoCo, mj_forward": ("forward_dynamics", run("mj_forward")),
-            "MuJoCo, equal work": ("forward_dynamics", run(*before, "mj_factorM", *after, "mj_solveM")),
-            "MuJoCo, mj_step": ("rk4_step", run("mj_step")),
+            "MuJoCo, mj_forward": run("mj_forward"),
+            "MuJoCo, equal work": run(*before, "mj_factorM", *after, "mj_solveM"),
         }
 
     def place(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> None:

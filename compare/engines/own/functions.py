@@ -44,13 +44,15 @@ QUANTITIES = {
     "jacobians": Quantity(1, (2, "bodies", 3, "nv")),
 }
 METHOD_NAMES = {name: name for name in QUANTITIES} | {"gravity": "gravity_balance"}  # of engines and tmt
+INVERSE = "inverse_dynamics"  # the name of a function that brings Mbar and h
+PUSH = 2.0**20  # rad/s2: gravity, which is subtracted, rounds little of what it needs
 QUICK = 1e-3  # s per state: functions that are as fast as this are called some hundred times more
 SAME = 1e-12  # of the largest value: values of a batch and of single states are equal except for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
 
 
 class OwnError(ValueError):
-    """A user's equations that cannot be used at all; the message is one line."""
+    """A user's equations that cannot be loaded or used; the message is one line."""
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
@@ -64,12 +66,33 @@ def functions_of(source: object, coordinates: Coordinates, required: Sequence[st
     values = {name: attribute(source, name) for name in QUANTITIES}
     values = {name: value for name, value in values.items() if value is not None}
     functions = {name: function_of(name, value, symbols, coordinates) for name, value in values.items()}
+    if callable(forces := attribute(source, INVERSE)) and not functions:
+        functions = of_inverse_dynamics(forces, coordinates)
     missing, name = [name for name in required if name not in functions], source_name(source)
-    if missing:
-        raise OwnError(f"{name} has no {missing[0]}; expected {' and '.join(map(call, required))}")
+    if missing and "acceleration" not in functions:
+        others = f"or {call('acceleration')}, or {INVERSE}(q, qd, qdd)"
+        raise OwnError(f"{name} has no {missing[0]}; expected {' and '.join(map(call, required))}, {others}")
     if not functions:
         raise OwnError(f"{name} has none of {', '.join(map(call, QUANTITIES))}")
     return functions
+
+
+def of_inverse_dynamics(forces: Function, coordinates: Coordinates) -> dict[str, Function]:
+    """Mbar and h of a function tau = Mbar qdd + h of q, qd, qdd."""
+
+    def bias(q: np.ndarray, qd: np.ndarray) -> Any:
+        return forces(q, qd, 0.0 * qd)
+
+    def mass_matrix(q: np.ndarray) -> np.ndarray:
+        still = np.zeros((*np.shape(q)[:-1], coordinates.nv))
+        at_rest = np.asarray(forces(q, still, still), float)
+        columns = [
+            np.asarray(forces(q, still, still + row), float) - at_rest
+            for row in PUSH * np.eye(coordinates.nv)
+        ]
+        return np.stack([column.reshape(still.shape) for column in columns], axis=-1) / PUSH
+
+    return {"mass_matrix": mass_matrix, "bias": bias}
 
 
 def call(name: str) -> str:

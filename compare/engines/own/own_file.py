@@ -26,15 +26,11 @@ FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
 SHOWN_NAMES = 6  # names in a message where none is close
 
 
-class OwnFileError(ValueError):
-    """Equations that cannot be loaded; the message is one line."""
-
-
 def own_object(stated: str) -> object:
-    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnFileError."""
+    """The object that FILE.py:OBJECT or MODULE:OBJECT names; a class is instantiated. OwnError."""
     place, _, name = stated.rpartition(":")
     if not place:
-        raise OwnFileError(f"{stated!r} names neither a file nor a module; expected {FORMS_OF_REFERENCE}")
+        raise OwnError(f"{stated!r} names neither a file nor a module; expected {FORMS_OF_REFERENCE}")
     is_file = place.endswith(".py") or any(sign in place for sign in {os.sep, "/"}) or Path(place).is_file()
     folder = os.path.dirname(os.path.realpath(place)) if is_file else os.getcwd()
     sys.path.append(folder)  # last: no file in it shadows a package
@@ -49,10 +45,10 @@ def own_object(stated: str) -> object:
 def module_of_file(place: str) -> ModuleType:
     path = Path(place)
     if path.is_dir():
-        raise OwnFileError(f"{place} is a folder; expected a Python file")
+        raise OwnError(f"{place} is a folder; expected a Python file")
     if not path.is_file():
         neighbours = [file.name for file in path.parent.glob("*.py")]
-        raise OwnFileError(f"{place}: no such file{close_names(path.name, neighbours)}")
+        raise OwnError(f"{place}: no such file{close_names(path.name, neighbours)}")
     name = f"compare_own_{path.stem}"  # a name that nothing else has: a file numpy.py shadows no package
     loader = importlib.machinery.SourceFileLoader(name, str(path.resolve()))
     spec = importlib.util.spec_from_loader(name, loader)
@@ -65,14 +61,14 @@ def module_of_file(place: str) -> ModuleType:
 
 def module_named(name: str) -> ModuleType:
     if not all(part.isidentifier() for part in name.split(".")):
-        raise OwnFileError(f"{name!r} is not the name of a module; expected {FORMS_OF_REFERENCE}")
+        raise OwnError(f"{name!r} is not the name of a module; expected {FORMS_OF_REFERENCE}")
     try:
         spec = importlib.util.find_spec(name)  # which imports a package that it is in
     except ModuleNotFoundError:
         spec = None
     if spec is None:
         neighbours = [file.stem for file in Path().glob("*.py")]
-        raise OwnFileError(f"{name}: no such module{close_names(name, neighbours)}")
+        raise OwnError(f"{name}: no such module{close_names(name, neighbours)}")
     return importlib.import_module(name)
 
 
@@ -83,7 +79,7 @@ def part_of(module: ModuleType, place: str, name: str) -> object:
         if not hasattr(value, part):
             public = [other for other in dir(value) if other[0] != "_"]
             names = [other for other in public if not inspect.ismodule(getattr(value, other, None))]
-            raise OwnFileError(f"{place} has no {part!r}{close_names(part, names)}")
+            raise OwnError(f"{place} has no {part!r}{close_names(part, names)}")
         value = getattr(value, part)
     return value
 
@@ -98,23 +94,23 @@ def close_names(name: str, known: Sequence[str]) -> str:
 
 @contextmanager
 def raised_in(place: str) -> Iterator[None]:
-    """Make an error of a user's code an OwnFileError of one line, with its line in the user's file."""
+    """Make an error of a user's code an OwnError, with its line in the user's file."""
     try:
         yield
-    except (OwnFileError, OwnError):
+    except OwnError:
         raise
     except SyntaxError as error:
         text = f": {' '.join(error.text.split())[:60]}" if error.text else ""
         where = place if Path(error.filename or place).stem == Path(place).stem else error.filename
         what = f"{type(error).__name__}, {error.msg}{text}"
-        raise OwnFileError(f"{where}, line {error.lineno}: {what}") from None
+        raise OwnError(f"{where}, line {error.lineno}: {what}") from None
     except BaseException as error:  # also SystemExit: the file may be a script
         if is_interrupt(error):
             raise
         every = traceback.extract_tb(error.__traceback__)
         frames = [frame for frame in every if Path(frame.filename).stem == Path(place).stem]
         at = f", line {frames[-1].lineno}" if frames else ""
-        raise OwnFileError(f"{place}{at}: {described(error, with_place=False)}") from None
+        raise OwnError(f"{place}{at}: {described(error, with_place=False)}") from None
 
 
 @contextmanager

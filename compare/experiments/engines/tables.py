@@ -13,7 +13,6 @@ from ...core.rows import Row, column
 class EngineRow(Row):
     """A quantity of an engine compared with exact values, with what it has read and with what this program has set."""
 
-    SHARE = "difference_over_bar"
     engine: str
     precision: str
     quantity: str

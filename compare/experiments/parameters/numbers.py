@@ -1,6 +1,5 @@
 """A number, stated and compiled: its rows, check and causes; that no other forces act; what touches."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple, cast
@@ -51,10 +50,6 @@ class NumberRow(Row):
     difference: float | None = None
     unit: str
     asked_by: str | None = column(optional=True)  # the option of the file that changes it
-
-    @property
-    def urgency(self) -> tuple[bool, bool, float]:
-        return True, not self.difference, math.inf
 
 
 @dataclass(kw_only=True)

@@ -34,7 +34,6 @@ class NeedRow(Row):
 class SubsetRow(Row):
     """Blocks of Mbar or of the bias with joints locked."""
 
-    SHARE = "difference_over_bar"
     locked: str = column(names=True)
     quantity: str
     parties: str

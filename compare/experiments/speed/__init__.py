@@ -40,17 +40,17 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     """Errors, times, orders, the error of rounding, and the cheapest settings."""
     names = [case.name for case in setup.robot.cases]
     scenes = sorted(begin(setup) if work is None else work, key=lambda scene: names.index(scene.case.name))
-    loops, absent = evaluations.loops(setup)
+    loops = evaluations.loops(setup)
     add_times(setup, scenes)
     result = judged(setup, scenes)
-    if settings := conclusions.cheapest_of_fronts(conclusions.best_rows(result)):
+    if settings := conclusions.cheapest_settings(result):
         values = {"settings": settings, **conclusions.target(result)}
         result.headline = result.finding("headline", **values)
         result.top.append(result.finding("answer", **values))
     result.tables["what_should_i_use"] = conclusions.advice(result)
     result.find("columns")
     setup.progress("speed: one evaluation")
-    result.tables["evaluations"] = evaluations.costs(loops, setup.of(12, 5, 2)) + absent
+    result.tables["evaluations"] = evaluations.costs(loops, setup.of(12, 5, 2))
     result.find("timing", once=timing.TIMED_ENOUGH, first_steps=FIRST_STEPS)
     add_absent(result, setup)
     return result

@@ -1,7 +1,7 @@
 """What follows from errors and times: checks of orders, same schemes and rounding; the cheapest settings."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
@@ -128,7 +128,7 @@ def advice(result: SpeedResult) -> list[AdviceRow]:
     for scene in result.floors:
         rows = [row for row in result.rows if row.scene == scene and not row.diverged]
         for target in TARGETS:
-            reach = [row for row in rows if row.largest_error <= target]
+            reach = reaching(rows, target)
             mujoco, tmt = cheapest(reach, "mujoco"), cheapest(reach, "tmt")
             rk4 = cheapest(reach, "mujoco", "RK4")
             same_step = cheapest([row for row in rows if rk4 and row.dt == rk4.dt], "tmt", "rk4")
@@ -183,14 +183,13 @@ def best_rows(result: SpeedResult) -> dict[str, list[SpeedRow]]:
     return {engine: best for engine, rows in of_engine.items() if (best := front(rows))}
 
 
-def within_target(rows: Sequence[SpeedRow]) -> SpeedRow | None:
-    """The cheapest setting of a front within TARGET."""
-    return next((row for row in rows if row.largest_error <= TARGET), None)
+def reaching(rows: Sequence[SpeedRow], target: float) -> list[SpeedRow]:
+    return [row for row in rows if row.largest_error <= target]
 
 
-def cheapest_of_fronts(fronts: Mapping[str, Sequence[SpeedRow]]) -> list[SpeedRow]:
-    """The cheapest setting of all engines, and the cheapest of MuJoCo (of tmt, if the first is MuJoCo's)."""
-    reached = [row for rows in fronts.values() if (row := within_target(rows))]
-    first = cheapest(reached)
+def cheapest_settings(result: SpeedResult) -> list[SpeedRow]:
+    """For TARGET where errors are regular: the cheapest of all engines, and of MuJoCo (of tmt, if MuJoCo's is the first)."""
+    reach = reaching([row for row in result.rows if row.scene == result.regular], TARGET)
+    first = cheapest(reach)
     other = "tmt" if first and first.engine == "mujoco" else "mujoco"
-    return [row for row in (first, cheapest(reached, other)) if row]
+    return [row for row in (first, cheapest(reach, other)) if row]

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 
 import tmt
-from tmt.compiled import Evaluator, runner_of
-from tmt.compiled.cores import cores
+from tmt.compiled import Evaluator
 
 from ...core import timing
 from ...core.rows import Row
@@ -19,24 +18,21 @@ from ..setup import Setup
 FEW, MANY = 1000, 100_000  # states of one call
 MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
 MOST_CALLS = 100_000  # repetitions in a timed call
-MOST_NUMBERS = 10_000_000  # of a path of many steps
-FORWARD, RK4_STEP = "forward_dynamics", "rk4_step"
-CALLED = "tmt.acceleration, called from Python"
+FORWARD = "forward_dynamics"
 ONE_BY_ONE, SIDE_BY_SIDE = "compiled", "compiled, side by side"
 
 
 @dataclass
 class EvaluationRow(Row):
-    """The time of one evaluation, or why it is not measured."""
+    """The time of one evaluation of the forward dynamics."""
 
     quantity: str
     implementation: str
-    states: int | None = 1  # of one call
-    threads: int | None = 1
+    states: int = 1  # of one call
+    threads: int = 1
     ns_per_state: float | None = None
     operations: int | None = None
     operations_per_ns: float | None = None
-    why_not: str | None = None
 
 
 class Loop(NamedTuple):
@@ -46,8 +42,8 @@ class Loop(NamedTuple):
     run: Callable[[int], object]
 
 
-def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
-    """All ways, compiled and not yet timed; and a row for what cannot be timed."""
+def loops(setup: Setup) -> list[Loop]:
+    """All ways, compiled and not yet timed; of MuJoCo none where its library is not found."""
     from ...engines.mujoco.calls import MinimalCalls  # here, as importing MuJoCo takes long
     from ...engines.mujoco.dynamics import MujocoDynamics
 
@@ -55,50 +51,23 @@ def loops(setup: Setup) -> tuple[list[Loop], list[EvaluationRow]]:
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
-    first = [values[0] for values in states]
-    tmt.prepare(tree)
-    ready, absent = [called(tree, *first), steps(tree, *first)], []
-    ready += at_many_states(tree, *(values[:FEW] for values in states))
-    if missing := MinimalCalls.unavailable():
-        absent.append(EvaluationRow(FORWARD, "MuJoCo, mj_forward", None, None, why_not=missing))
-    else:
+    ready = at_many_states(tree, *(values[:FEW] for values in states))
+    if not MinimalCalls.unavailable():
         dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
-        of_mujoco = MinimalCalls(dynamics).loops(*first).items()
-        ready += [Loop(EvaluationRow(quantity, name), run) for name, (quantity, run) in of_mujoco]
+        of_mujoco = MinimalCalls(dynamics).loops(*(values[0] for values in states)).items()
+        ready += [Loop(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
     for loop in ready:
         loop.run(1)  # its code is compiled, or loaded, on the first call
-    return ready + (at_many_states(tree, *states) if many > FEW else []), absent
+    return ready + (at_many_states(tree, *states) if many > FEW else [])
 
 
-def called(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Loop:
-    """Accelerations called from Python, at one state or at many."""
-    row = EvaluationRow(FORWARD, CALLED) if q.ndim == 1 else EvaluationRow(FORWARD, CALLED, len(q), cores())
-    return Loop(row, repeated(lambda: tmt.acceleration(q, qd, tau, tree)))
-
-
-def steps(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> Loop:
-    """Steps of RK4 from one state, each of which waits for the last."""
-    run, most = runner_of(tree, "rk4").follow, min(MOST_CALLS, MOST_NUMBERS // len(qd))
-    paths = [np.zeros((1, most + 1, len(part))) for part in (q, qd)]
-    paths[0][0, 0], paths[1][0, 0] = q, qd
-
-    def loop(count: int) -> None:
-        positions, speeds = (path[:, : min(count, most) + 1].copy() for path in paths)
-        run(positions, speeds, tau[None], 1e-4, 0.0, 1)
-
-    return Loop(EvaluationRow(RK4_STEP, ONE_BY_ONE), loop)
-
-
-def at_many_states(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray) -> list[Loop]:
-    """The ways of tmt over many states, (N, nq) and (N, nv)."""
-    count, run, compiled = len(qd), runner_of(tree, "rk4").follow, Evaluator(tree, "acceleration")
-    out = np.empty((count, compiled.size))
-    positions, speeds = (np.stack([part, part], axis=1) for part in (q, qd))
-    step = EvaluationRow(RK4_STEP, SIDE_BY_SIDE, count, cores())
-    ways = [called(tree, q, qd, tau), Loop(step, repeated(lambda: run(positions, speeds, tau, 1e-3, 0.0, 1)))]
+def at_many_states(tree: tmt.Tree, *states: np.ndarray) -> list[Loop]:
+    """The ways of tmt over many states, q (N, nq), qd and tau (N, nv)."""
+    compiled = Evaluator(tree, "acceleration")
+    out, ways = np.empty((len(states[0]), compiled.size)), []
     for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
-        row = EvaluationRow(FORWARD, name, count, operations=compiled.operations)
-        ways.append(Loop(row, repeated(partial(compiled.fill, in_lanes, out, q, qd, tau))))
+        row = EvaluationRow(FORWARD, name, len(out), operations=compiled.operations)
+        ways.append(Loop(row, repeated(partial(compiled.fill, in_lanes, out, *states))))
     return ways
 
 
@@ -111,13 +80,13 @@ def repeated(call: Callable[[], object]) -> Callable[[int], None]:
 
 
 def costs(ready: Sequence[Loop], rounds: int) -> list[EvaluationRow]:
-    """The rows of ways that are timed, by quantity, the slowest first."""
+    """The rows of ways that are timed, the slowest first."""
     counts = [repetitions(loop.run) for loop in ready]
     calls: list[Callable[..., Any]] = [partial(loop.run, count) for loop, count in zip(ready, counts)]
     for (row, _), count, seconds in zip(ready, counts, timing.in_turns(calls, rounds)):
-        row.ns_per_state = 1e9 * min(seconds) / (count * (row.states or 1))
+        row.ns_per_state = 1e9 * min(seconds) / (count * row.states)
         row.operations_per_ns = row.operations and row.operations / row.ns_per_state
-    return sorted((loop.row for loop in ready), key=lambda row: (row.quantity, -(row.ns_per_state or 0.0)))
+    return sorted((loop.row for loop in ready), key=lambda row: -(row.ns_per_state or 0.0))
 
 
 def repetitions(run: Callable[[int], object]) -> int:

@@ -11,7 +11,7 @@ from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
 from ..figures import chart
-from .conclusions import TARGET, best_rows, cheapest_of_fronts, front, target, within_target
+from .conclusions import TARGET, best_rows, cheapest, cheapest_settings, front, reaching, target
 from .runs import SpeedResult, SpeedRow
 
 METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
@@ -52,17 +52,16 @@ def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
 def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
     """Time against error: the best settings of each engine; the cheapest within the target has a circle."""
     fig, ax = chart()
-    fronts = best_rows(result)
-    for engine, rows in fronts.items():
+    for engine, rows in best_rows(result).items():
         colour, (errors, times) = COLOURS.get(engine, GREY), drawn(rows)
         label, mark = LABELS.get(engine, engine), MARKS.get(engine, "v")
         ax.plot(errors, times, label=label, color=colour, marker=mark, markersize=3.5, linewidth=1.2)
-        if best := within_target(rows):
+        if best := cheapest(reaching(rows, TARGET)):
             ax.plot(*drawn([best]), "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
     ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
     ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {result.unit} (decreasing)", ylabel="time, ms")
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
-    settings = cheapest_of_fronts(fronts)
-    return "overview_times", fig, result.finding("overview_caption", settings=settings, **target(result))
+    caption = result.finding("overview_caption", settings=cheapest_settings(result), **target(result))
+    return "overview_times", fig, caption

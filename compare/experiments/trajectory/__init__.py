@@ -4,8 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple, cast
 
-import numpy as np
-
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
 from ...engines import LABELS, Engine
@@ -97,10 +95,7 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
         result.rows += part.rows
         result.checks += part.checks
         result.runs += part.runs
-    with np.errstate(over="ignore", invalid="ignore"):  # in runs that diverge
-        drawn = [motion.pictures_of(case, result.runs) for case in robot.cases]
-    result.pictures = motion.in_order([pictures for pictures in drawn if pictures], robot)
-    errors.find_departures(result, robot, setup.engines)
+    errors.find_departures(result, robot)
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
     result.notes += work.left_out
@@ -146,8 +141,8 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
             yield partial(figures_runs.draw_held, result, run, numbers[case.name])
     for case in cases:
         yield partial(figures_runs.draw_run, result, case)
-    if result.pictures:
-        yield partial(figures_motion_gif.draw_motion, result)
+    if drawn := motion.drawn_runs(robot, result.runs):
+        yield partial(figures_motion_gif.draw_motion, drawn, result.label)
 
 
 def overview(results: Mapping[str, TrajectoryResult], robot: Robot) -> Iterator[partial[Any]]:

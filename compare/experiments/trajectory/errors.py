@@ -1,4 +1,4 @@
-"""Errors of both engines: against the true motion, and in the energy; and why a held robot leaves its posture."""
+"""Errors of both engines: against the true motion, and in the energy; and when a held robot leaves its posture."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,13 +7,11 @@ from typing import Any
 import numpy as np
 
 from tmt import literal
-from tmt.methods import METHODS
 
 from ...core.check import About, Result
 from ...core.rows import Row, column
 from ...engines import LABELS, Dynamics, Engine, compared, one_of_each_scheme, same_scheme
 from ...judge.order import ORDER_MARGIN, measured_order
-from ...judge.rounding import slope_rounding
 from ...judge.run import LEFT, deviation, moved_from, movement_unit, number_or_none
 from ...judge.scale import EPS, FACTOR, gravity_scale
 from ...robots import Robot
@@ -22,7 +20,6 @@ from ...truth.reference import Reference
 from .runs import Run, TrajectoryResult
 
 SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
-NO_TIME = 1e-6  # s: a step in which nothing moves
 DURATION = 1.0  # s: short enough to measure the order, long enough to move
 STEPS = {1: (4096, 8192), 4: (512, 1024)}  # by the order of the method
 FEW_STEPS = STEPS | {1: (1024, 2048)}
@@ -76,34 +73,18 @@ def difference_while_judged(run: Run) -> float:
     return float(moved_from(first, mujoco, run.case.coordinates).max())
 
 
-def find_departures(result: TrajectoryResult, robot: Robot, engines: Mapping[str, Engine]) -> None:
-    """When each engine leaves the posture of each held scene, and whether its torque holds it."""
+def find_departures(result: TrajectoryResult, robot: Robot) -> None:
+    """When each engine leaves the posture of each held scene, and how far it goes."""
     claims = robot.claims.of_scenes if robot.claims else {}
     for run in coarsest_runs(result, robot):
         case = run.case
         if case.is_held:
+            farthest = deviations(run)
+            engines = [{"label": LABELS[engine], "left": path.left, "farthest": farthest[engine]}
+                       for engine, path in run.paths.items()]  # fmt: skip
             about: dict[str, Any] = {"claim": claims.get(case.name), "limit": LEFT, "duration": case.duration}
             about |= {"unit": movement_unit(case.coordinates), "stated": robot.compared[0] == "tmt"}
-            result.find("held", scene=robot.scene_begins(case.name), **about, **departures(run, engines))
-
-
-def departures(run: Run, engines: Mapping[str, Engine]) -> dict[str, Any]:
-    """The initial acceleration under the torque that should hold, and what rounding can cause, rad/s2.
-
-    Both of the joint whose acceleration is the largest share of what rounding can cause in it.
-    """
-    case = run.case
-    dt, ((name, first), (mujoco, last)) = case.duration / case.steps, compared(engines, case).items()
-    allowed = slope_rounding(METHODS["rk4"], case.tree, case.q[None], case.v[None], case.tau, dt)[2][0]
-    of_step = first.run(*case.start, case.tau, NO_TIME, 1, "rk4").v[1] / NO_TIME
-    initial = {name: of_step, mujoco: last.acceleration(*case.start, case.tau)}
-    joint = int(np.argmax(np.max(np.abs([*initial.values()]), axis=0) / allowed))
-    farthest, told = deviations(run), []
-    for engine, acceleration in initial.items():
-        push = number_or_none(np.abs(acceleration[joint]))
-        about = {"label": LABELS[engine], "left": run.paths[engine].left, "farthest": farthest[engine]}
-        told.append(about | {"push": push, "holds": push is not None and push <= allowed[joint]})
-    return {"allowed": float(allowed[joint]), "engines": told}
+            result.find("held", scene=robot.scene_begins(case.name), engines=engines, **about)
 
 
 @dataclass

@@ -12,17 +12,18 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from ...core.finding import Finding
-from ...core.pictures import Pictures
 from ...core.text import say
 from ...engines import LABELS
 from ...report.style import BLUE, ORANGE
-from .runs import TrajectoryResult
+from .motion import Pictures, pictures_of
+from .runs import Run
 
 Pen = ImageDraw.ImageDraw
 Links = Sequence[tuple[int, int]]
 PIXELS, TOP, BOTTOM = (640, 420), 78, 34  # pixels; and the margins for text above and below
 ROOM = PIXELS[0] - 36, PIXELS[1] - TOP - BOTTOM - 36
 MIDDLE = PIXELS[0] / 2, (PIXELS[1] + TOP - BOTTOM) / 2
+FEW_STICKS = 6  # up to which they are drawn wide
 FINE = 2  # a picture is drawn larger by this factor
 SHADES = 16  # colours of the GIF
 BLACK = "#1a1a1a"
@@ -43,7 +44,7 @@ class Animation:
         pictures: list[Image.Image] = []
         times: list[int] = []
         for scene in self.scenes:
-            paths = scene.placed(ROOM, MIDDLE)
+            paths = placed(scene)
             still = text_of_scene(scene, self.label, paths[0][0, 0])
             pictures += [one_picture(scene, k, still, paths) for k in range(len(scene.t))]
             times += [10 * CENTISECONDS] * (len(scene.t) - 1) + [10 * PAUSE]
@@ -52,13 +53,22 @@ class Animation:
         first.save(path, save_all=True, append_images=others, duration=times, loop=0, optimize=False)
 
 
-def draw_motion(result: TrajectoryResult) -> tuple[str, Animation, Finding]:
-    """The first two scenes that are drawn in motion, of which one is held and one let go."""
-    scenes = result.pictures[:2]
+def draw_motion(runs: Sequence[Run], label: str) -> tuple[str, Animation, Finding]:
+    with np.errstate(over="ignore", invalid="ignore"):  # in runs that diverge
+        scenes = [pictures_of(run) for run in runs]
     engines = [LABELS[name] for name in scenes[0].points]
     seen = [{"name": scene.scene, "run": scene.run, "seen": scene.seen.values} for scene in scenes]
-    caption = result.finding("figure_motion", engines=engines, scenes=seen)
-    return "motion", Animation(scenes, result.label), caption
+    caption = Finding("trajectory", "figure_motion", {"engines": engines, "scenes": seen})
+    return "motion", Animation(scenes, label), caption
+
+
+def placed(scene: Pictures) -> list[np.ndarray]:
+    """The points of each engine in a drawing whose y goes down."""
+    points = np.concatenate([path.reshape(-1, 2) for path in scene.points.values()])
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = points.min(axis=0), points.max(axis=0)
+    scale = (np.array(ROOM) / np.maximum(high - low, 1e-3)).min()
+    return [MIDDLE + scale * (path - (low + high) / 2) * [1.0, -1.0] for path in scene.points.values()]
 
 
 def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.ndarray]) -> Image.Image:
@@ -68,7 +78,7 @@ def one_picture(scene: Pictures, k: int, still: Image.Image, paths: Sequence[np.
     alive = [bool(np.isfinite(path[k]).all()) for path in paths]
     for which, path in enumerate(paths):
         if alive[which]:
-            draw_sticks(pen, path[k], scene.links, which, scene.few_sticks)
+            draw_sticks(pen, path[k], scene.links, which, len(scene.links) <= FEW_STICKS)
     lost = [LABELS[name] for name, is_alive in zip(scene.points, alive) if not is_alive]
     left = {LABELS[name]: time for name, time in scene.left.items() if time and time <= scene.t[k]}
     write(pen, (PIXELS[0] - 16, PIXELS[1] - 28), f"t = {scene.t[k]:.2f} s", 17, "ra")
@@ -99,7 +109,8 @@ def text_of_scene(scene: Pictures, label: str, base: np.ndarray) -> Image.Image:
     image = Image.new("RGB", (FINE * PIXELS[0], FINE * PIXELS[1]), "white")
     pen = ImageDraw.Draw(image)
     write(pen, (16, 10), scene.scene, 20)
-    run = said("run", run=scene.run, slower=scene.slower(CENTISECONDS / 100.0))
+    factor = CENTISECONDS / 100.0 / float(scene.t[1] - scene.t[0])
+    run = said("run", run=scene.run, slower=1.0 if 0.9 < factor < 1.1 else factor)
     write(pen, (PIXELS[0] - 16, 50), run, 14, "ra")
     for which, (x, name) in enumerate(zip(NAMES_AT, (label, LABELS["mujoco"]))):
         draw_sticks(pen, np.array([[x + 4, 62], [x + 36, 62]]), [(0, 1)], which)

@@ -1,31 +1,60 @@
-"""The motion as it is drawn: stick figures of both engines, at most 128 for each scene."""
+"""The motion as it is drawn: stick figures of both engines, at most 128 for each of two scenes."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.finding import Finding
-from ...core.pictures import Pictures
 from ...engines import LABELS
 from ...judge.run import LEFT, movement_unit, step_in_words
 from ...robots import Robot
-from ...robots.case import Case
 from ...robots.stick import as_seen, stick_figure
 from .errors import SCHEMES_OF_RK4
 from .runs import Run
 
 FRAMES = 128  # of a scene at most, without its start
+SCENES = 2
 
 
-def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
-    """The motion of a case by RK4, states of its runs; None if there is no such run.
+class Pictures(NamedTuple):
+    """The stick figures of both engines in one scene, at equal times."""
 
-    A held scene is drawn with its own step, as the departure depends on the step; others with the finest one.
+    scene: str
+    run: str  # method and step
+    t: np.ndarray  # (pictures,) s
+    points: dict[str, np.ndarray]  # by engine (pictures, points, 2): right, up, m; NaN once it diverged
+    links: list[tuple[int, int]]  # pairs of points that a stick joins
+    apart: np.ndarray  # (pictures,): the largest difference of a joint; NaN if an engine has diverged
+    unit: str  # of that
+    left: dict[str, float | None]  # by engine: when a held robot left its posture, s
+    seen: Finding  # departures, the largest difference, divergence
+    fixed: bool  # whether the first point does not move, as the first joint only turns
+
+
+def drawn_runs(robot: Robot, runs: Sequence[Run]) -> list[Run]:
+    """Those of a held scene, better one that is left, and of a free one, better from the same posture.
+
+    By RK4, a held scene with its own step, as the departure depends on it, others with the finest one.
     """
-    by_steps = {run.steps: run for run in runs if run.case.name == case.name and run.scheme in SCHEMES_OF_RK4}
-    if not by_steps:
-        return None
-    run, unit = by_steps[(min if case.is_held else max)(by_steps)], movement_unit(case.coordinates)
+    chosen: dict[str, Run] = {}
+    for case in robot.cases:
+        by_steps = {
+            run.steps: run for run in runs if run.case.name == case.name and run.scheme in SCHEMES_OF_RK4
+        }
+        if by_steps:
+            chosen[case.name] = by_steps[(min if case.is_held else max)(by_steps)]
+    held = [run for run in chosen.values() if run.case.is_held]
+    held = sorted(held, key=lambda run: all(path.left is None for path in run.paths.values()))[:1]
+    postures = [run.case.scene.posture for run in held]
+    free = [run for run in chosen.values() if run.case.is_free]
+    free = sorted(free, key=lambda run: run.case.scene.posture not in postures)[:1]
+    first = {run.case.name: run for run in (*held, *free, *chosen.values())}
+    return list(first.values())[:SCENES]
+
+
+def pictures_of(run: Run) -> Pictures:
+    case, unit = run.case, movement_unit(run.case.coordinates)
     every = slice(None, None, -(-run.steps // FRAMES))
     positions, points = [], {}
     for engine, path in run.paths.items():
@@ -47,14 +76,3 @@ def pictures_of(case: Case, runs: Sequence[Run]) -> Pictures | None:
     })  # fmt: skip
     label, fixed = f"{run.integrator}, {step_in_words(case, run.steps)}", case.robot.tree.kind[0] != "slide"
     return Pictures(case.name, label, run.t[every], points, links, apart, unit, left, seen, fixed)
-
-
-def in_order(drawn: Sequence[Pictures], robot: Robot) -> list[Pictures]:
-    """A held scene, better one with a departure, a free one, better of the same posture, and the rest."""
-    cases = {case.name: case for case in robot.cases}
-    held = [scene for scene in drawn if cases[scene.scene].is_held]
-    free = [scene for scene in drawn if cases[scene.scene].is_free]
-    first = sorted(held, key=lambda scene: not any(scene.left.values()))[:1]
-    postures = [cases[scene.scene].scene.posture for scene in first]
-    first += sorted(free, key=lambda scene: cases[scene.scene].scene.posture not in postures)[:1]
-    return first + [scene for scene in drawn if all(scene is not other for other in first)]

@@ -29,7 +29,6 @@ RECORDED = 64  # states of a run that are compared: one for each of the scene's 
 class TrajectoryRow(Row):
     """The largest difference of the engines in single steps, or in an open loop."""
 
-    SHARE = "difference_over_band"
     scene: str
     engine_integrator: str
     twin: str

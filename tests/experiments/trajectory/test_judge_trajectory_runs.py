@@ -154,7 +154,7 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
 
 def test_which_figures_there_are_follows_what_was_run():
     result = TrajectoryResult("trajectory", runs=[run_of(FREE), run_of(HELD)], errors={HELD.name: (0.1, 0.2)})
-    names = ["assignment_figure_2", "trajectory_ball_catch_held", "trajectory_bent_free"]
+    names = ["assignment_figure_2", "motion", "trajectory_ball_catch_held", "trajectory_bent_free"]
     assert sorted(call()[0] for call in trajectory.figures(result, ARM)) == names
 
 
@@ -179,7 +179,8 @@ def followed(engines):
 
 @pytest.fixture(scope="module")
 def drawn(followed):
-    return motion.pictures_of(CATCH, followed)
+    (run,) = motion.drawn_runs(ARM, followed)
+    return motion.pictures_of(run)
 
 
 def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, followed):
@@ -196,7 +197,7 @@ def test_a_run_is_drawn_until_it_has_diverged(followed):
     coarse = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 64))
     for ended, last in ((None, 64), (2.5, 31), (5 / 64, 0)):
         paths = coarse.paths | {"tmt": coarse.paths["tmt"]._replace(ended=ended)}
-        scene = motion.pictures_of(CATCH, [replace(coarse, paths=paths)])
+        scene = motion.pictures_of(replace(coarse, paths=paths))
         seen = np.isfinite(scene.points["tmt"]).all(axis=(1, 2))
         assert len(scene.t) == 65 and np.flatnonzero(seen).tolist() == [*range(last + 1)]
         assert np.array_equal(np.isfinite(scene.apart), seen) and np.isfinite(scene.points["mujoco"]).all()
@@ -224,8 +225,7 @@ def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_
     right = left[:, ::-1]
     points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
     scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
-    name, figure, _ = gif.draw_motion(TrajectoryResult("trajectory", pictures=[scene]))
-    figure.savefig(tmp_path / f"{name}{figure.suffix}")
+    gif.Animation([scene], "TMT").savefig(tmp_path / "motion.gif")
     found = []
     with Image.open(tmp_path / "motion.gif") as image:
         for k in range(image.n_frames):

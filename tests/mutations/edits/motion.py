@@ -42,7 +42,6 @@ EDITS = (
      "the last state is not judged"),
     ("trajectory", "check_end", "min(_1 for q in _2)", "max(_1 for q in _2)", "it is enough that one run moves"),
     ("trajectory", "check_level", "movements.max()", "movements.min()", "the least difference is the largest"),
-    ("trajectory.errors", "departures", "push <= allowed[joint]", "True", "whatever pushes is rounding"),
     ("trajectory.errors", "check_order", "finer <= _1", "True", "every drift is rounding"),
     ("trajectory.errors", "largest_drift", "energy - energy[0]", "0.0 * energy", "no energy is lost"),
     ("sub_blocks", "check_blocks", "closest(_1, _2)", "(0,)", "the first state is judged"),

@@ -14,7 +14,7 @@ EDITS = (
     ("truth.reference", "reference", "case.tree", "case.robot.tree", "the reference is of the robot without the scene"),
     ("truth.reference", "in_doubles", "not _1 < runs[-2][0] / 2.0", "True", "doubles stop at their third run"),
     ("conclusions", "cheapest", "min(fit, *_1)", "max(fit, *_1)", "the dearest is advised"),
-    ("conclusions", "advice", "_1 <= target", "_1 <= 10 * target", "a setting ten times too inexact is advised"),
+    ("conclusions", "reaching", "_1 <= target", "_1 <= 10 * target", "a setting ten times too inexact is advised"),
     ("conclusions", "ratio", "slow.time / fast.time", "fast.time / slow.time", "ratios are inverted"),
     ("conclusions", "advice", "ratio(mujoco, rk4)", "ratio(rk4, mujoco)", "the gain by the integrator is inverted"),
     ("conclusions", "setting", "_1 if row.dt else _2", "_1", "an adaptive setting has steps for its tolerance"),

@@ -30,5 +30,7 @@ EDITS = (
     ("stability.limits", "GIVES_WAY", "0.3", "30.0", "a rest far away is the same"),
     ("stability.limits", "Tried.is_stable", "not self.run_grows", "True", "a run that grows is stable"),
     ("stability.growth", "growth", "is_uncertain=is_uncertain", "is_uncertain=False", "what may be noise needs no run", 1),
+    ("stability.place", "Place.has_fallen", "of_base(self.model)", "True", "an arm that sinks has fallen"),
+    ("stability.place", "restless_objects", "np.bincount(tree)[tree] == 6", "True", "a walker is a loose object"),
     ("equilibria", "check_reset", "run.first_reset is not None", "False", "no reset is looked at"),
 )  # fmt: skip
