@@ -32,5 +32,7 @@ EDITS = (
     ("stability.growth", "growth", "is_uncertain=is_uncertain", "is_uncertain=False", "what may be noise needs no run", 1),
     ("stability.place", "Place.has_fallen", "of_base(self.model)", "True", "an arm that sinks has fallen"),
     ("stability.place", "restless_objects", "np.bincount(tree)[tree] == 6", "True", "a walker is a loose object"),
+    ("stability.cures", "least_factor", "_1 or grows(rest)", "_1", "no cure is run"),
+    ("of_file", "control_row", "ceil(_1 / asked.dt - WHOLE)", "round(_1 / asked.dt)", "a delay is rounded"),
     ("equilibria", "check_reset", "run.first_reset is not None", "False", "no reset is looked at"),
 )  # fmt: skip
