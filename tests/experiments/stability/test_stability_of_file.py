@@ -1,5 +1,6 @@
 """Which step is stable for the robot of a file: what is judged and said, and the tables of a run."""
 
+from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -144,6 +145,8 @@ def test_a_program_at_its_own_rate_is_judged(actuator, gains):
         assert row.is_stable is stable and row.grows_in_run is not stable
         passed = [check.passed for check in result.checks if "control period" in check.quantity]
         assert passed == [stable, True]
+        of_file.add_control(result, replace(row, grows_in_run=stable))  # not as predicted
+        assert [check.passed for check in result.checks][-2:] == [stable, False]
         if delay is None:
             assert 0.012 < row.longest_period < 0.02
     result = found_of(MOTOR, control_period=0.02)

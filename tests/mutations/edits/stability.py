@@ -34,5 +34,6 @@ EDITS = (
     ("stability.place", "restless_objects", "np.bincount(tree)[tree] == 6", "True", "a walker is a loose object"),
     ("stability.cures", "least_factor", "_1 or grows(rest)", "_1", "no cure is run"),
     ("of_file", "control_row", "ceil(_1 / asked.dt - WHOLE)", "round(_1 / asked.dt)", "a delay is rounded"),
+    ("of_file", "add_control", "int(row.grows_in_run != row.is_stable)", "1", "a program runs as predicted"),
     ("equilibria", "check_reset", "run.first_reset is not None", "False", "no reset is looked at"),
 )  # fmt: skip
