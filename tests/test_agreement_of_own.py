@@ -134,6 +134,9 @@ def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(gi
     noise = 1.0 + 1e-7 * np.random.default_rng(0).normal(size=(12, 2, 2))
     noisy = {"mass_matrix": values["mass_matrix"] * (noise + np.swapaxes(noise, 1, 2)) / 2.0} | states
     assert 1e-8 < advised(**noisy) < 1e-6 and advised(**noisy, rtol=1e-9) is None
+    of_knee = 20.0 * np.diag([0.0, 1.0]) * (noise - 1.0)  # 2e-6: small beside the largest entry alone
+    noisy["mass_matrix"] = values["mass_matrix"] + of_knee
+    assert advised(**noisy) is None
     scaled = values["mass_matrix"] * (1.0 + 1e-7)  # a factor of all is a cause
     assert advised(mass_matrix=scaled, **states) is None
     bad = np.where(states["q"] > 1.0, np.nan, values["bias"])

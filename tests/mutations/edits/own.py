@@ -34,6 +34,7 @@ EDITS = (
     ("agreement", "assert_agrees", "_1 or comparison.problems", "_1", "a changed argument agrees"),
     ("agreement", "rows", "-row.ratio", "row.ratio", "the smallest ratio first"),
     ("agreement", "rounded", "of_largest <= ROUNDED", "True", "a slip small beside the terms is rounding"),
+    ("agreement", "rounded", "worst <= ROUNDED", "True", "a small entry may be off by anything"),
     ("agreement", "message", "why.is_found or comparison.rtol", "comparison.rtol", "an rtol is advised beside a cause"),
     ("agreement", "message", "why.is_found or comparison.rtol", "why.is_found", "a larger rtol is advised than stated"),
     ("judge.entries", "Entries.mass_matrix", "root[_1] * root[_2]", "0.0", "a structural zero has no tolerance"),
