@@ -286,6 +286,17 @@ def test_a_slip_of_a_table_is_named(change, said):
     assert said in message_of(bias=change(h), **states)
 
 
+@pytest.mark.parametrize("word, brought", [
+    ("shifted", lambda h, noise: {"mass_matrix": [[[3.0 + x, 1.0], [1.0, 0.7]] for x in noise]}),
+    ("exchanged", lambda h, noise: {"bias": np.column_stack([h[:, 1], h[:, 1] + noise])}),
+    ("single", lambda h, noise: {"mass_matrix": np.round(noise)[:, None, None] + np.eye(2)}),
+])  # fmt: skip
+def test_a_slip_that_explains_a_part_alone_is_not_named(word, brought):
+    """Right entries that are constant, one column of two, whole numbers."""
+    states, h = table()
+    assert word not in message_of(**brought(h, 9.0 * np.random.default_rng(4).normal(size=len(h))), **states)
+
+
 @pytest.mark.parametrize("factors, said", [
     ([25.0, 1.0], "tau of hip: your acceleration takes 25 times it"),
     ([1.0, 0.0], "tau of knee: your acceleration does not depend"),
