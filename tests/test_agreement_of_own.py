@@ -229,6 +229,8 @@ def test_the_cause_is_sought_where_there_are_values():
     worst = differences(bias=values, q=q, qd=qd)[0]
     assert worst.ratio == np.inf and worst.state.number < 30
     assert "cause" not in message_of(mass_matrix=lambda q: np.full((2, 2), np.nan))
+    rare = lambda q, v: bias(q, v) + [0.5 * (q[0] > 3.0), 0.0]  # noqa: E731, at none of the first states
+    assert "Differs: gravity alone, in h[hip]" in message_of(mass_matrix=mass_matrix, bias=rare)
     values = np.array([1.1 * acceleration(*state) for state in zip(q, qd, tau)])
     assert "give mass_matrix and bias" in message_of(acceleration=values, q=q, qd=qd, tau=tau)
 
