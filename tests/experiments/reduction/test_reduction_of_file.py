@@ -277,7 +277,8 @@ def test_recorded_controls_are_held_between_their_times():
 @pytest.mark.parametrize("text, message", [
     ("time,left upper\n0,1\n0.1,2\n", ""), ("time,elbow\n0,1\n0.1,2\n", "no actuator elbow"),
     ("time,left upper\n0,x\n", "cannot read"),
-    ("time,left upper\n0.1,1\n0.2,1\n", "rises from 0"), ("time\n0\n1\n", "at least one"), ("", "cannot read"),
+    ("time,left upper\n0.1,1\n0.2,1\n", "rises from 0"), ("time,left upper\n0,1\n0,2\n", "rises from 0"),
+    ("time\n0\n1\n", "at least one"), ("", "cannot read"),
     ("time,left upper\n0,nan\n1,1\n", "numbers"), ("time,left upper\n0,1\n1\n", "cannot read"),
 ])  # fmt: skip
 def test_a_file_of_controls_is_read_or_refused_in_one_line(tmp_path, text, message):
