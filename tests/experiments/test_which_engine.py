@@ -2,6 +2,7 @@
 
 import dataclasses
 from itertools import accumulate, chain, product, repeat
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from compare.engines import RECORDS, Motion
 from compare.engines.outside import Outside, servos_of
 from compare.engines.outside.model import FROM_FILE, numbers_of
 from compare.experiments.engines import batches, rows, servos
-from compare.experiments.engines.answer import cheapest_of
+from compare.experiments.engines.answer import cheapest_engine, cheapest_of
+from compare.experiments.engines.integrators import step_of
 from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult, MethodRow
@@ -158,6 +160,19 @@ def test_the_cheapest_method_is_that_of_the_engines_own_time():
     fields = cheapest_of(rows, 2.0)
     assert (fields["within_1e_3"], fields["within_1e_3_cost"]) == ("alone", 2000.0)
     assert fields["within_1e_6"] is None and (fields["floor"], fields["floor_method"]) == (0.9e-3, "slow")
+
+
+def test_the_cheapest_engine_is_that_of_the_least_cost_among_those_that_reach_an_error():
+    costs = {None: 1.0, "rk4": 3.0, "RK4": 2.0}
+    rows = [SimpleNamespace(within_1e_3=name, within_1e_3_cost=cost) for name, cost in costs.items()]
+    assert (
+        cheapest_engine(rows, "1e_3") == (rows[2], "RK4", 2.0) and cheapest_engine(rows[:1], "1e_3") is None
+    )
+
+
+@pytest.mark.parametrize("dt, step", [(0.003, 2.0**-9), (0.002, 2.0**-9), (0.1, 2.0**-7)])
+def test_a_single_step_is_a_power_of_two_and_no_longer_than_the_files(dt, step):
+    assert step_of(SimpleNamespace(reading=SimpleNamespace(dt=dt))) == step
 
 
 def test_engines_are_chosen_by_their_names():
