@@ -147,3 +147,12 @@ def test_actuators_act_in_their_own_scene_alone():
         wanted = case.tau - np.array(case.tree.position_gain) @ case.q if one is case else 0.0
         assert np.allclose(dynamics.other_forces(one.q, one.v)["actuators"], wanted, atol=1e-12)
         assert np.allclose(dynamics.acceleration(*one.start, one.tau), ours.acceleration(*one.start, one.tau))
+
+
+@pytest.mark.parametrize("option, why", [
+    ('actuatorgroupdisable="2"', "group 2"), ('actuatorgroupdisable="1"', ""), ("", ""),
+])  # fmt: skip
+def test_an_actuator_of_a_group_that_the_file_disables_is_off(option, why):
+    motor = '<actuator><motor name="a" joint="j" group="2"/></actuator>'
+    (actuator,) = read(mjcf(before=f"<option {option}/>", after=motor)).drive.actuators
+    assert why in actuator.off and bool(why) is bool(actuator.off)
