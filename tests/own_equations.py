@@ -2,6 +2,7 @@
 user's file in test_own_reference and test_help."""
 
 import time
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -81,6 +82,11 @@ infinite = changed(bias=lambda q, qd: bias(q, qd) + np.inf)
 doubled = changed(gravity=lambda q: 2.0 * gravity(q))
 SWAPPED = {"mass_matrix": lambda q: mass_matrix(q[::-1])[::-1, ::-1]}
 SWAPPED["bias"] = lambda q, v: bias(q[::-1], v[::-1])[::-1]
+alone, alone_sign, alone_damped = (
+    SimpleNamespace(acceleration=partial(acceleration, **more))
+    for more in ({}, {"bias": wrong_bias}, {"damping": 0.5})
+)
+inverse = SimpleNamespace(inverse_dynamics=lambda q, qd, qdd: mass_matrix(q) @ qdd + bias(q, qd))
 swapped, named = changed(**SWAPPED), changed(**SWAPPED, joint_names=["knee", "hip"])
 
 

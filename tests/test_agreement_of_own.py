@@ -282,6 +282,7 @@ def table(count=20):
     (lambda h: np.concatenate([h[:4], h[4:5] + [0.0, 0.01], h[5:]]), "1 row of 20 of your bias is wrong: row 4 has h[knee]"),
     (lambda h: np.roll(h, 1, axis=0), "shifted by one: each has the values of the row before"),
     (lambda h: h[:, ::-1], "exchanged: h[hip] holds h[knee], h[knee] holds h[hip]"),
+    (lambda h: h.round(3), "bias is rounded to 3 decimals; it differs by no more than that. Export more digits, or state rtol="),
 ])  # fmt: skip
 def test_a_slip_of_a_table_is_named(change, said):
     states, h = table()
@@ -297,6 +298,14 @@ def test_a_slip_that_explains_a_part_alone_is_not_named(word, brought):
     """Right entries that are constant, one column of two, whole numbers."""
     states, h = table()
     assert word not in message_of(**brought(h, 9.0 * np.random.default_rng(4).normal(size=len(h))), **states)
+
+
+@pytest.mark.parametrize("more, is_rounded", [(0.0, True), (0.05, False)])
+def test_a_table_whose_states_are_rounded_too(more, is_rounded):
+    (states, h) = table()
+    rounded = {name: part.round(2) for name, part in states.items()}
+    message = message_of(bias=h.round(2) + more, **rounded)
+    assert ("to 2 decimals, and so are its states" in message) is is_rounded
 
 
 @pytest.mark.parametrize("factors, said", [

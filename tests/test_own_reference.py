@@ -82,6 +82,21 @@ def test_what_is_wrong_is_seen_where_it_acts(folder, asked, names, where, quanti
     assert "runs to its end" not in quantities
 
 
+def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
+    names = [*STATIC, "trajectory", "diagnosis"]
+    asked = [name for name in names if not skipped(name, examined(folder, "mine.py:alone", []).robot)]
+    assert asked == ["acceleration", "trajectory", "diagnosis"]
+    assert not examined(folder, "mine.py:alone", asked).failed
+    assert not examined(folder, "mine.py:inverse", STATIC).failed
+    for reference, place in (
+        ("alone_sign", "h[hip], coefficient of knee'^2"),
+        ("alone_damped", "damping of hip"),
+    ):
+        run = examined(folder, f"mine.py:{reference}", ["acceleration", "diagnosis"])
+        assert run.causes[0].place == place
+        assert {check.experiment for check in run.failed} == {"acceleration", "diagnosis"}
+
+
 def test_trajectories_are_those_of_rk4(folder):
     run = examined(folder, "mine.py:Object", ["trajectory"])
     assert run.sections[0].result.checks and not run.failed
@@ -120,7 +135,7 @@ def test_what_nothing_explains_is_drawn_along_the_coordinate_that_tells_most(fol
     curve = section.result.curve
     assert (curve.entry, curve.coordinate) == ("h[hip]", "knee") and not run.causes
     assert np.ptp(curve.yours - curve.right) == pytest.approx(2.0, rel=0.03)
-    assert [name for name, _ in section.figures] == ["diagnosis_nearest", "diagnosis_curve"]
+    assert [name for name, _ in section.figures] == ["diagnosis_curve"]
 
 
 @pytest.mark.parametrize("asked, joints, right", [

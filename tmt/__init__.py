@@ -357,6 +357,8 @@ def equations(
         states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
         with a symbol for each parameter, for some six hinges and slides (needs SymPy).
     quantities : functions of this package, by name; with symbols mass_matrix, bias, gravity_balance.
+        Of a step [A B], as "step_derivatives:rk4"; of a frame "frame_pose:hand", "frame_jacobian:hand" and
+        "frame_convective:hand".
     name : of the file, which begins the names of C functions.
     single : float in C.
     head : lines that begin the comment at its head.

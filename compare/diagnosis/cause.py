@@ -33,8 +33,6 @@ class Diagnosis(NamedTuple):
     parts: tuple[str, ...] = ()  # that differ: "M", "h", or its "velocity terms" and "gravity"
     known: tuple[str, ...] = ()  # parts that are compared
     is_symmetric: bool = True  # the given M
-    # single changes that leave least: what they leave, a share, and whether it is within the tolerance
-    nearest: tuple[tuple[str, float, bool], ...] = ()
     too_few: int = 0  # states, if they are too few for a search
     seconds: float | None = None  # of a search that was not finished
 

@@ -20,6 +20,7 @@ from tmt.derivation.vectors import Matrix
 from ..core.cause import Cause
 from ..core.words import listed
 from ..robots.joint_map import PER_UNIT, Joint, JointMap
+from .cause import together
 from .model import Equations
 from .terms import speeds_of_joints
 
@@ -212,33 +213,36 @@ def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
 
 
 def of_balls(equations: Equations) -> Iterator[Convention]:
-    """Of each ball and free joint: axes of the velocities, order and sense of the quaternion."""
-    tree, q, qd, nv = equations.tree, equations.q, equations.qd, equations.nv
-    of_speeds, identity = speeds_of_joints(tree), np.broadcast_to(np.eye(nv), (len(qd), nv, nv))
-
-    def convention(
-        place: str, explains: str, q: ndarray = q, S: ndarray = identity, drift: ndarray | float = 0.0
-    ) -> Convention:
-        cause = Cause(rank=1, kind="axes", place=place, stated="", explains=explains)
-        return Convention(cause, q, np.einsum("sij,sj->si", S, qd), S, drift + 0.0 * qd)
-
+    """Of each ball and free joint: order and sense of the quaternion, axes of the velocities, and both."""
+    tree, q, qd, of_speeds = equations.tree, equations.q, equations.qd, speeds_of_joints(equations.tree)
     for i, joint in ((i, joint) for i, joint in enumerate(tree.coordinates.joints) if joint.kind == "ball"):
-        name, R = tree.joint_names[i], matrices(turn_in_parent(tree, i, list(q.T)), len(q))
-        world = identity.copy()
-        world[:, joint.qd, joint.qd] = np.swapaxes(R, 1, 2)
-        yield convention(f"angular velocity of {name}", "in world axes", S=world)
-        slides = ", ".join(tree.joint_names[max(i - 3, 0) : i])
-        if slides in of_speeds and i >= 3:
-            v = slice(of_speeds[slides][0], joint.qd.start)
-            linear, drift = identity.copy(), 0.0 * qd
-            linear[:, v, v] = R
-            drift[:, v] = np.einsum("sij,sj->si", R, np.cross(qd[:, joint.qd], qd[:, v]))
-            yield convention(f"linear velocity of {slides}", "in body axes", S=linear, drift=drift)
-        scalar_last, inverse = q.copy(), q.copy()
-        scalar_last[:, joint.q] = np.roll(q[:, joint.q], 1, axis=1)
-        inverse[:, joint.q] = q[:, joint.q] * [1.0, -1.0, -1.0, -1.0]
-        yield convention(f"quaternion of {name}", "read as x, y, z, w", scalar_last)
-        yield convention(f"quaternion of {name}", "of the inverse rotation", inverse)
+        name, slides = tree.joint_names[i], ", ".join(tree.joint_names[max(i - 3, 0) : i])
+        is_free = slides in of_speeds and i >= 3
+        order, sense = q.copy(), q.copy()
+        order[:, joint.q] = np.roll(q[:, joint.q], 1, axis=1)
+        sense[:, joint.q] = q[:, joint.q] * [1.0, -1.0, -1.0, -1.0]
+        quaternions = {"": q, "read as x, y, z, w": order, "of the inverse rotation": sense}
+        for (of_q, own_q), in_world, in_body in product(
+            quaternions.items(), (False, True), (False, True)[: 1 + is_free]
+        ):
+            said = {f"quaternion of {name}": of_q, f"angular velocity of {name}": "in world axes" * in_world}
+            said[f"linear velocity of {slides}"] = "in body axes" * in_body
+            R = matrices(turn_in_parent(tree, i, list(own_q.T)), len(q))
+            S, drift = np.tile(np.eye(equations.nv), (len(q), 1, 1)), 0.0 * qd
+            if in_world:
+                S[:, joint.qd, joint.qd] = np.swapaxes(R, 1, 2)
+            own_qd = np.einsum("sij,sj->si", S, qd)
+            if in_body:
+                v = slice(of_speeds[slides][0], joint.qd.start)
+                S[:, v, v] = R
+                drift[:, v] = np.einsum("sij,sj->si", R, np.cross(own_qd[:, joint.qd], qd[:, v]))
+                own_qd = np.einsum("sij,sj->si", S, qd)
+            causes = [
+                Cause(rank=1, kind="axes", place=place, stated="", explains=explains)
+                for place, explains in said.items() if explains
+            ]  # fmt: skip
+            if causes:
+                yield Convention(together(causes, 0.0), own_q, own_qd, S, drift)
 
 
 def matrices(turn: Matrix, count: int) -> ndarray:

@@ -18,7 +18,8 @@ from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
 from .variants import Variant, variant
 
 UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
-    "lengths": ((1e3, 1e2, 1e-3, 1e-2), ("offset", "com")), "masses": ((1e3, 1e-3), ("mass",)),
+    "lengths": ((1e3, 1e2, 1e-3, 1e-2, 1.0 / 0.0254, 0.0254), ("offset", "com")),
+    "masses": ((1e3, 1e-3, 1.0 / 0.45359237, 0.45359237), ("mass",)),
     "moments of inertia": ((1e3, 1e4, 1e6, 1e7, 1e9, 1e-3), ("inertia",)),
 }  # fmt: skip
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
@@ -162,6 +163,13 @@ def absent(equations: Equations) -> Iterator[Edit]:
         yield name, "left out", fields
 
 
+def concentrated(equations: Equations) -> Iterator[Edit]:
+    """The mass of all bodies at the CoM of one of them."""
+    mass = equations.stated["mass"]
+    for name, at in zip(equations.tree.body_names, np.eye(len(mass))):
+        yield "masses of every body", f"at the CoM of {name}", {"mass": mass.sum() * at}
+
+
 def swapped(equations: Equations) -> Iterator[Edit]:
     """Numbers of two bodies or joints exchanged; the length and the CoM of a link exchanged."""
     tree, stated = equations.tree, equations.stated
@@ -188,7 +196,7 @@ def swapped(equations: Equations) -> Iterator[Edit]:
         if parent == i >= 0
     ):
         offset, com = stated["offset"].copy(), stated["com"].copy()
-        offset[j], com[b] = com[b], offset[j]
+        offset[j], com[b] = stated["com"][b], stated["offset"][j]
         place = f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}"
         yield place, "exchanged", {"offset": offset, "com": com}
 
@@ -239,9 +247,10 @@ def turn(tree: tmt.Tree, joint: int, fields: dict[str, ndarray], by: ndarray) ->
     """Turn all that a joint carries, where all joints are at zero."""
     carried = [k for k in range(len(tree.parent)) if joint in tree.path(k)]
     bodies = [b for b, k in enumerate(tree.body_joint) if k in carried]
-    speeds = np.concatenate([np.arange(len(tree.axis))[tree.coordinates.joints[k].qd] for k in carried])
-    for field, rows in {"axis": speeds, "offset": carried[1:], "com": bodies}.items():
-        fields[field][rows] = fields[field][rows] @ by.T
+    speeds = [v for k in carried for v in np.arange(len(tree.axis))[tree.coordinates.joints[k].qd].tolist()]
+    rows: dict[str, list[int]] = {"axis": speeds, "offset": carried[1:], "com": bodies}
+    for field, those in rows.items():
+        fields[field][those] = fields[field][those] @ by.T
     fields["inertia"][bodies] = by @ fields["inertia"][bodies] @ by.T
 
 
@@ -268,5 +277,5 @@ def about(k: int, angle: float) -> ndarray:
 
 
 KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
-    absent, of_rows, about_one_axis, swapped, scaled, axes, turns,
+    absent, concentrated, of_rows, about_one_axis, swapped, scaled, axes, turns,
 )  # fmt: skip

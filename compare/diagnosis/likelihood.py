@@ -12,10 +12,10 @@ NATURAL = 1.0  # a cause that costs less is said; the others only if there is no
 OF_KINDS = {  # what a cause of a kind costs, besides its numbers
     "option": 0.0, "sign": 0.0, "angles": 0.0, "number": 0.0, OF_ZERO: 0.05, "unit": 0.1, "body": 0.12, "axes": 0.15,
     "term": 0.15, "part": 0.16, "force": 0.2, "numbers": 0.2, "order": 0.25, "slip": 0.3, "coefficient": 0.3,
-    "added": 0.3,    "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.65,
+    "added": 0.3,    "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.5,
 }  # fmt: skip
 OF_NAME, ADDED, PAIR = 0.1, 0.1, 0.3  # for each joint that is named; a number that was 0; a second cause
-IN_PART = 0.12  # of a slip in some parts alone
+IN_PART, CONVENTION_IN_PART = 0.12, 0.2  # of a slip in some parts alone; of a convention more
 OF_WORDS = {"every": 0.03, "damping added": 0.1, "R' I R": -0.05}  # in a place
 ALONE = " alone", "but not in gravity", "but not in the velocity terms of h"
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
@@ -26,7 +26,8 @@ def cost(cause: Cause, equations: Equations) -> float:
     if len(cause.parts) > 1:
         return PAIR + sum(cost(part, equations) for part in cause.parts)
     words = sum(more for word, more in OF_WORDS.items() if word in cause.place)
-    return of_one(cause, equations) + words + IN_PART * cause.place.endswith(ALONE)
+    in_part = IN_PART + CONVENTION_IN_PART * (cause.kind in ("sign", "axes", "angles", "unit", "order"))
+    return of_one(cause, equations) + words + in_part * cause.place.endswith(ALONE)
 
 
 def of_one(cause: Cause, equations: Equations) -> float:
@@ -36,6 +37,10 @@ def of_one(cause: Cause, equations: Equations) -> float:
         words = cause.place.replace(",", " ").split()
         slides = sum(kinds.get(word) == "slide" for word in words)
         return base + OF_NAME * (1 + cause.place.count(",") + words.count("and")) + 0.15 * slides
+    if cause.kind == "several":
+        numbers, stated_numbers = (map(float, str(those).split(", ")) for those in (value, cause.stated))
+        pairs = zip(numbers, stated_numbers)
+        return base + float(np.mean([of_number(x, right, equations) for x, right in pairs]))
     if not isinstance(value, float):
         return base
     stated = cause.stated if isinstance(cause.stated, float) else 0.0

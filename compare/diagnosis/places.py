@@ -23,9 +23,11 @@ INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2),
 EVERY_BODY = "every body"
 COMMON_FACTORS = (-1.0, 0.0, 0.5, 1.0, 2.0)
 OF_ZERO = "zero position"  # the kind of a place
-DEGREES = np.outer(
-    (90, 180, 45, 30, 60, 15, 120, 135, 150, 270), (1.0, -1.0)
-).ravel()  # angles that are written as rad
+# angles that are written in one unit and read in the other, rad: as they are read, and as they are meant
+COMMON_ANGLES = np.radians(np.outer((90, 180, 45, 30, 60, 15, 120, 135, 150, 270), (1.0, -1.0)).ravel())
+READ_ANGLES = np.concatenate([np.degrees(COMMON_ANGLES), np.radians(COMMON_ANGLES)])
+MEANT_ANGLES = np.tile(COMMON_ANGLES, 2)
+WRITTEN = 1e-6  # of a turn: what the digits of an angle leave
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 SMALL = 1e-9  # of the other numbers: a number that a regression leaves at 0
 ALL = slice(None)  # entries of a state
@@ -65,13 +67,13 @@ class Place(NamedTuple):
         return self.value(change) >= self.least
 
     def cause(self, change: float) -> Cause:
-        """The change as a cause; of a zero that is a number of degrees taken as rad, this number."""
+        """The change as a cause; of a zero whose angle is read in another unit, both angles."""
         place, unit = self.name, self.unit
         if self.kind == OF_ZERO and unit == "rad":
-            turns = (change - DEGREES + np.radians(DEGREES)) / (2.0 * np.pi)
-            for angle in np.abs(DEGREES[np.abs(turns - np.round(turns)) < FIT_ROUNDING]).tolist():
-                right = float(np.radians(angle))
-                return Cause(rank=2, kind="number", place=place, stated=right, explains=angle, unit=unit)
+            turns = (change - READ_ANGLES + MEANT_ANGLES) / (2.0 * np.pi)
+            for k in np.flatnonzero(np.abs(turns - np.round(turns)) < WRITTEN).tolist():
+                meant, read = abs(float(MEANT_ANGLES[k])), abs(float(READ_ANGLES[k]))
+                return Cause(rank=2, kind="number", place=place, stated=meant, explains=read, unit=unit)
         stated, explains = float(self.stated), self.value(change)
         return Cause(rank=self.rank, kind=self.kind, place=place, stated=stated, explains=explains, unit=unit)
 
@@ -165,8 +167,11 @@ def numbers(equations: Equations) -> Iterator[Place]:
         for place in triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent):
             yield place
             if joint.kind != "slide":
-                along = [(path.at[1], x) for path, x in place.moves]
-                stays = [(Path(field, (index, k)), -x) for field, index in carried for k, x in along]
+                stays = [
+                    (Path(field, (index, path.at[1])), -x)
+                    for field, index in carried
+                    for path, x in place.moves
+                ]
                 anchor = place.name.replace("offset", "anchor", 1)
                 yield place._replace(name=anchor, moves=(*place.moves, *stays))
         if joint.kind != "ball":

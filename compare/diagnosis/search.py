@@ -27,15 +27,15 @@ from .places import OF_ZERO
 from .recursion import slips_of_recursion
 from .statements import Stated, Statements
 from .terms import all_places
-from .variants import Variant, lagrange, other_angles, program_options
+from .variants import Variant, exchanged_entries, lagrange, other_angles, other_variables, program_options
 
 FEW = 2  # states at which conventions are tried first
-SHOWN = 12  # single explanations that leave least
 NEAREST = 0.5  # of the difference: what leaves more is not near
 NEAR = 2  # conventions with which another cause is sought
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 # pairs of a slip and a number that are tried: by what they leave to first order
 SECOND_ORDER, MOST_NEAR = 0.1, 200
+WITHOUT = "velocity terms in h", "bias"  # left out: nothing else can be wrong there
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
     ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in gravity alone",
@@ -88,14 +88,12 @@ class Explanations:
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
-        possible = [fit for fit in self.all_singles if fit.is_possible]
-        nearest = sorted(possible, key=lambda fit: fit.left_over)[:SHOWN]
-        shares = tuple((fit.places[0].name, fit.left_over, fit.explains) for fit in nearest)
-        found = found._replace(nearest=shares, causes=ranked(distinct(sorted(causes, key=self.cost))))
         if causes:
-            return found
+            return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))))
+        near = [fit for fit in self.all_singles if fit.is_possible and fit.left_over < NEAREST]
+        closest = min(near, key=lambda fit: fit.left_over, default=None)
         return found._replace(
-            closest=nearest[0].cause if nearest and nearest[0].left_over < NEAREST else None,
+            closest=closest.cause if closest else None,
             details=Compared(self.given).details() if layout.qdd is None else (),
             seconds=None if self.is_finished else self.seconds,
         )
@@ -112,7 +110,7 @@ class Explanations:
         """
         unusual: list[Cause] = []
         stages = (
-            self.everything, self.derivations, self.of_parts, self.other_angles, self.groups, self.beside_conventions, self.pairs,
+            self.everything, self.derivations, self.of_parts, self.other_angles, self.groups, self.two_causes,
         )  # fmt: skip
         for stage in stages:
             causes: list[Cause] = []
@@ -131,7 +129,9 @@ class Explanations:
     def everything(self) -> Iterator[Cause]:
         """Options, conventions, single numbers and terms, and edits of several numbers."""
         yield from self.search.explained(self.options)
-        yield from self.in_conventions
+        for convention, values in self.in_conventions(self.search):
+            for cause in self.search.explained([(convention.cause, values)]):
+                yield from self.statements.restated(cause, convention.joints)
         yield from self.statements.causes(fit for fit in self.all_singles if fit.explains)
         yield from self.search.explained(self.variants)
 
@@ -140,13 +140,12 @@ class Explanations:
         yield from self.search.explained(self.recursions)
 
     def groups(self) -> Iterator[Cause]:
-        """Loads, tensors about other axes, and numbers of all bodies or joints."""
+        """Loads, and tensors about other axes."""
         yield from loads(self.equations, self.search)
         yield from turned(self.equations, self.search)
-        yield from several(self.search)
 
     def of_parts(self) -> Iterator[Cause]:
-        """Slips in some parts alone: in all that differ, or one cause for each."""
+        """Slips in some parts alone, in all that differ."""
         different, known, causes = self.differing, self.known, []
         if {"velocity terms", "M"} <= set(different) and self.h_follows_from_M:
             different, known = (
@@ -156,8 +155,12 @@ class Explanations:
         if different != self.known:
             causes += self.within(different, self.differing)
         yield from causes
-        if causes:
-            return
+
+    def of_each_part(self) -> Iterator[Cause]:
+        """One cause for some parts, and one for the others."""
+        different = self.differing
+        if {"velocity terms", "M"} <= set(different) and self.h_follows_from_M:
+            different = [name for name in different if name != "velocity terms"]
         for part in different if len(different) > 2 else different[:-1]:
             one, others = self.within([part], [part]), [name for name in different if name != part]
             if one and (two := self.within(others, others)):
@@ -186,6 +189,8 @@ class Explanations:
         angles = other_angles(self.equations, search)
         for variant in chain(self.options, self.variants, self.recursions, angles):
             add(search.explained([variant]), variant[1] - search.right)
+        for convention, values in self.in_conventions(search):
+            add(search.explained([(convention.cause, values)]), values - search.right)
         for fit in (fit for fit in search.singles(is_thorough=False) if fit.explains):
             add(self.statements.causes([fit]), search.change(fit))
         return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
@@ -206,9 +211,12 @@ class Explanations:
                 both = together([convention.cause, cause], 0.0)
                 yield from self.statements.restated(both, convention.joints)
 
-    def pairs(self) -> Iterator[Cause]:
+    def two_causes(self) -> Iterator[Cause]:
+        yield from self.beside_conventions()
+        yield from several(self.search)
         fits = self.search.pairs(("number", OF_ZERO), ("number", OF_ZERO, "term", "coefficient"))
         yield from self.statements.causes(fit for fit in fits if fit.explains)
+        yield from self.of_each_part()
         yield from self.with_slips()
 
     def with_slips(self) -> Iterator[Cause]:
@@ -228,8 +236,9 @@ class Explanations:
                 yield together([variants[v][0], search.places[k].cause(change)], 0.0)
         both = squares[:, None] + np.einsum("vm,vm->v", moved, moved) - 2.0 * left @ moved.T
         for v, w in np.argwhere(np.triu(both < enough)).tolist()[:MOST_NEAR]:
-            if np.abs(left[v] - moved[w]).max() <= 1.0:
-                yield together([variants[v][0], variants[w][0]], 0.0)
+            pair = variants[v][0], variants[w][0]
+            if np.abs(left[v] - moved[w]).max() <= 1.0 and not any(cause.place in WITHOUT for cause in pair):
+                yield together(pair, 0.0)
 
     # what is computed once
 
@@ -239,7 +248,8 @@ class Explanations:
 
     @cached_property
     def variants(self) -> list[Variant]:
-        return [*edits(self.equations), *lagrange(self.equations)]
+        kinds = edits, lagrange, exchanged_entries, other_variables
+        return [*chain.from_iterable(kind(self.equations) for kind in kinds)]
 
     @cached_property
     def recursions(self) -> list[Variant]:
@@ -254,26 +264,30 @@ class Explanations:
             return []
 
     @cached_property
-    def conventions(self) -> list[tuple[float, Convention]]:
-        """What each convention leaves at a few states, a share, and the convention."""
-        search, those = self.search, list(all_conventions(self.equations))
-        few = [convention.first(FEW) for convention in those]
-        size = float(np.linalg.norm(search.off[:FEW])) or 1.0
-        left = [np.linalg.norm(search.weighted(values)) / size for values in values_in(self.equations, few)]
-        return [(float(share), convention) for share, convention in zip(left, those)]
+    def conventions(self) -> list[tuple[Convention, ndarray]]:
+        """The conventions, and the values in each at a few states."""
+        those = list(all_conventions(self.equations))
+        return list(zip(those, values_in(self.equations, [convention.first(FEW) for convention in those])))
 
-    @property
-    def in_conventions(self) -> Iterator[Cause]:
-        """The conventions that leave nothing."""
-        for convention in (convention for share, convention in self.conventions if share < 1e-3):
-            variants = [(convention.cause, values) for values in values_in(self.equations, [convention])]
-            for cause in self.search.explained(variants):
-                yield from self.statements.restated(cause, convention.joints)
+    def shares(self, search: Search) -> list[tuple[float, Convention]]:
+        """What each convention leaves at a few states, a share, and the convention."""
+        size = float(np.linalg.norm(search.off[:FEW])) or 1.0
+        left = (
+            (np.linalg.norm(search.weighted(values)), convention) for convention, values in self.conventions
+        )
+        return [(float(share) / size, convention) for share, convention in left]
+
+    def in_conventions(self, search: Search) -> Iterator[tuple[Convention, ndarray]]:
+        """The conventions that leave nothing at a few states, with the values at all."""
+        for convention in (convention for share, convention in self.shares(search) if share < 1e-3):
+            yield from ((convention, values) for values in values_in(self.equations, [convention]))
 
     @property
     def near_conventions(self) -> list[Convention]:
         """The conventions that leave least, if they leave something."""
-        best = sorted((pair for pair in self.conventions if pair[0] < PARTIAL), key=lambda pair: pair[0])
+        best = sorted(
+            (pair for pair in self.shares(self.search) if pair[0] < PARTIAL), key=lambda pair: pair[0]
+        )
         return [convention for _, convention in best[:NEAR]]
 
     @property
@@ -292,9 +306,10 @@ def in_part(cause: Cause, parts: Sequence[str]) -> Cause:
 
 def distinct(causes: Iterable[Cause]) -> list[Cause]:
     """Each cause once; none of every body or joint where one of them suffices."""
-    once: dict[tuple[str, str], Cause] = {}
+    once: dict[frozenset[tuple[str, str]], Cause] = {}
     for cause in causes:
-        once.setdefault((cause.place, str(cause.explains)), cause)
+        parts = cause.parts if len(cause.parts) > 1 else (cause,)
+        once.setdefault(frozenset((part.place, str(part.explains)) for part in parts), cause)
     return [cause for cause in once.values() if not any(is_of_one(other, cause) for other in once.values())]
 
 

@@ -5,7 +5,7 @@ A variant is a cause with Mbar and h as they would be, as `Equations.values` has
 
 from collections.abc import Iterable, Iterator
 from functools import partial
-from itertools import combinations, permutations, product
+from itertools import chain, combinations, permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +13,9 @@ import numpy as np
 from tmt import literal
 
 from ..core.cause import Cause
+from ..core.words import listed
 from .fit import Search
-from .model import TINY, Equations, Path
+from .model import MOST_SPEEDS, TINY, Equations, Path
 from .terms import unit_columns
 
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
@@ -26,6 +27,7 @@ OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, an
     ("gradient of the kinetic energy in h", "twice"): (1.0, 2.0),
     ("Mdot qd in h", "left out"): (0.0, 1.0), ("Mdot qd in h", "halved"): (0.5, 1.0),
     ("Mdot qd in h", "halved, and no gradient of the kinetic energy"): (0.5, 0.0),
+    ("C(q, qd) in h", "transposed, C' qd for C qd"): (0.0, -1.0),
 }  # fmt: skip
 OF_FACTORS = "coefficient", "term", "part"  # kinds of places
 MOST_HINGES = 4  # of which products of sines and cosines are tried
@@ -67,12 +69,45 @@ def program_options(equations: Equations) -> Iterator[Variant]:
             h, still = Equations(tree, *states[:2]).h, Equations(tree, *states[2:]).h
             values = equations.with_bias(h - still, still)
             yield option("arguments of bias", "bias(q, qd)", explains, values)
-    for where, left in {"above": np.tril(M), "below": np.triu(M), "off": M * np.eye(equations.nv)}.items():
-        values = equations.layout.packed(left, moving, rest)
-        yield option(f"entries of M {where} the diagonal", "there", "left out", values)
+    triangles = {"off": M - M * np.eye(equations.nv)}
+    if not equations.layout.is_symmetric:
+        triangles |= {"above": np.triu(M, 1), "below": np.tril(M, -1)}
+    for where, change in triangles.items():
+        for explains, factor in OF_SLOPES.items():
+            values = equations.layout.packed(M + (factor - 1.0) * change, moving, rest)
+            yield option(f"entries of M {where} the diagonal", "there", explains, values)
     if any(tree.armature):
         rotors = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
         yield option("armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])
+
+
+def exchanged_entries(equations: Equations) -> Iterator[Variant]:
+    """Two entries of Mbar or two rows of h exchanged."""
+    entries, layout = equations.entries, equations.layout
+    of_M = [(entry, [k]) for k, entry in enumerate(entries[equations.in_M])]
+    of_h = [(entries[layout.in_M.stop + i], layout.of_row(i)) for i in range(equations.nv)]
+    pairs = chain(combinations(of_M, 2), combinations(of_h, 2)) if equations.nv <= MOST_SPEEDS else ()
+    for (first, here), (second, there) in pairs:
+        values = equations.right.copy()
+        values[:, [*here, *there]] = values[:, [*there, *here]]
+        names = [entry.named(equations.speeds) for entry in (first, second)]
+        yield variant(2, "numbers", listed(names), "", "exchanged", values)
+
+
+def other_variables(equations: Equations) -> Iterator[Variant]:
+    """The position, the speed or both of a joint taken for those of another of its kind."""
+    tree, q, qd, layout = equations.tree, equations.q, equations.qd, equations.layout
+    joints = zip(tree.joint_names, tree.coordinates.joints)
+    straight = [(name, joint) for name, joint in joints if joint.kind != "ball"]
+    for (name, joint), (other, by) in permutations(straight, 2) if len(straight) <= MOST_SPEEDS else ():
+        if joint.kind != by.kind:
+            continue
+        moved, faster = q.copy(), qd.copy()
+        moved[:, joint.q], faster[:, joint.qd] = q[:, by.q], qd[:, by.qd]
+        for what, state in {"q": (moved, qd), "qd": (q, faster), "q and qd": (moved, faster)}.items():
+            yield slip(
+                f"{what} of {other} taken for that of {name}", "", "", Equations(tree, *state, layout).right
+            )
 
 
 def in_turn(together: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -158,10 +193,11 @@ def sums_of(hinges: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """The angles of hinges, and sums and differences of two or three of them."""
     angles = dict(hinges)
     for count in (2, 3) if len(hinges) <= MOST_HINGES else (2,):
-        for (first, *others), *signs in product(combinations(hinges, count), *[(1.0, -1.0)] * (count - 1)):
-            terms = list(zip(signs, others))
-            name = first + "".join(f" {'+' if sign > 0.0 else '-'} {other}" for sign, other in terms)
-            angles[name] = hinges[first] + sum(sign * hinges[other] for sign, other in terms)
+        for (first, *others), signs in product(combinations(hinges, count), product("+-", repeat=count - 1)):
+            name, angle = first, hinges[first]
+            for sign, other in zip(signs, others):
+                name, angle = f"{name} {sign} {other}", angle + float(f"{sign}1") * hinges[other]
+            angles[name] = angle
     return angles
 
 

@@ -13,6 +13,7 @@ order of the case; and Mbar a + bias = tau - D v.
 """
 
 import importlib
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
@@ -117,9 +118,8 @@ class Motion(NamedTuple):
     ended: str | Array | None = None
     steps: int | None = None  # that the method took; None: not known
     seconds: float | None = None  # of the run, where the engine measures it in a process of its own
-    seconds_alone: float | None = (
-        None  # of its steps without Python's share; None: there is none, or it is not known
-    )
+    # of its steps without Python's share; None: there is none, or it is not known
+    seconds_alone: float | None = None
 
     @property
     def states(self) -> Array:
@@ -199,11 +199,12 @@ class Dynamics(Protocol):
         """run() follows one motion once more; read(what it returned) is the motion at the start and at 64 equal times."""
 
 
-class OneByOne:
+class OneByOne(ABC):
     """Runs of dynamics that follow one motion at a time."""
 
+    @abstractmethod
     def prepared(self, course: Course) -> Prepared:
-        raise NotImplementedError
+        """The functions of `Dynamics.prepare` for a course."""
 
     def run(
         self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None

@@ -8,14 +8,12 @@ a rotation vector, and its angular velocity in world axes.
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, Course, EngineRecord
-from .outside.model import Body, File, Link
+from . import Array, EngineRecord
 from .outside.of_urdf import OfUrdf
-from .outside.order import order_of
+from .outside.order import VECTOR, Order, State, of_free
 
 ENGINE = EngineRecord(order=75, label="DART", colour="#882255", marker="*", package="dartpy", reads_file=True)
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
@@ -29,9 +27,7 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 class Model(OfUrdf):
     """A Skeleton alone in a World that never lets bodies sleep, as it does by default."""
 
-    has_free_bodies = True
-
-    def load(self, text: str, file: File) -> Array:
+    def load(self, text: str) -> None:
         import dartpy
 
         loader, options = dartpy.utils.DartLoader(), dartpy.utils.DartLoaderOptions()
@@ -42,30 +38,20 @@ class Model(OfUrdf):
         never = self.world.getDeactivationOptions()
         never.mEnabled = False
         self.world.setDeactivationOptions(never)
-        self.joints: dict[int, Any] = {}  # by their numbers in the Tree
-        for k, (name, kind) in enumerate(zip(file.names, file.kinds)):
-            joint = self.skeleton.getJoint(name.removesuffix(" turn") if kind == "ball" else name)
-            if joint is not None:  # else it is a part of a free joint
-                self.joints[k] = joint
-        places = {k: joint.getIndexInSkeleton(0) for k, joint in self.joints.items()}  # in q and in v
-        starts = {k: (place, place) for k, place in places.items()}
-        self.order = order_of(file, starts, (3, 4, 5, 0, 1, 2), (3, 4, 5, 0, 1, 2), in_world=True)
-        self.dampers = {places[k]: joint for k, joint in self.joints.items() if not file.is_free(k)}
-        damping = np.zeros(len(self.order.v))
-        for place, joint in self.dampers.items():
-            damping[self.order.v[place]] = joint.getDampingCoefficient(0)
-        return damping
-
-    def links(self, q: Array) -> list[Link]:
-        numbers = {joint.getName(): k for k, joint in self.joints.items()}
-        links = []
-        for node in self.skeleton.getBodyNodes():
-            place, inertia, parent = node.getWorldTransform(), node.getInertia(), node.getParentBodyNode()
-            body = Body(inertia.getMass(), node.getLocalCOM(), inertia.getMoment())
-            joint = numbers.get(node.getParentJoint().getName())
-            names = node.getName(), parent and parent.getName()
-            links.append(Link(*names, joint, place.rotation(), place.translation(), body))
-        return links
+        starts, self.dampers = (
+            dict[int, tuple[int, int]](),
+            dict[int, Any](),
+        )  # the latter by their places in q and v
+        for k, name in enumerate(self.file.names):
+            is_free = self.file.is_free(k)
+            joint = self.skeleton.getJoint(name.removesuffix(" turn") if is_free else name)
+            if joint is None:  # a part of a free joint
+                continue
+            place = joint.getIndexInSkeleton(0)
+            starts |= of_free(k, (place + 3, place + 3), (place, place)) if is_free else {k: (place, place)}
+            if not is_free:
+                self.dampers[place] = joint
+        self.order = Order(self.file, starts, free=VECTOR, angular_in_world=True)
 
     def gravity(self) -> Array:
         return np.array(self.world.getGravity())
@@ -73,50 +59,32 @@ class Model(OfUrdf):
     def set_gravity(self, gravity: Array) -> None:
         self.world.setGravity(gravity)
 
-    def set_state(self, q: Array, v: Array) -> None:
-        self.q, (x, speeds) = q, self.order.engine(q, v)
-        for at, place in self.order.turned:
-            x[at] = Rotation.from_quat(np.roll(q[place], -1)).as_rotvec()
-        self.skeleton.setPositions(x)
-        self.skeleton.setVelocities(speeds)
+    def set_state(self, at: State) -> None:
+        self.skeleton.setPositions(at.x)
+        self.skeleton.setVelocities(at.u)
 
-    def start(self, course: Course) -> None:
-        self.start_at(course.q, course.v, course.dt, self.damping)
-
-    def start_at(self, q: Array, v: Array, dt: float, damping: Array) -> None:
-        """Prepare steps of dt from a state, with this damping of the joints."""
+    def start(self, at: State, dt: float, method: str | None) -> None:
         self.world.setTimeStep(dt)
-        self.rotors = self.armature / dt  # coefficients of the dampers that are armature
+        self.rotors = self.read["armature"] / dt  # coefficients of the dampers that are armature
+        damping = self.rotors + (0.0 if method is None else self.stated["damping"])
         for place, joint in self.dampers.items():
-            joint.setDampingCoefficient(0, (damping + self.rotors)[self.order.v[place]])
-        self.set_state(q, v)
+            joint.setDampingCoefficient(0, damping[self.order.v[place]])
+        self.set_state(at)
 
-    def set_force(self, force: Array, v: Array) -> None:
-        self.skeleton.setForces(self.order.engine(self.q, force + self.rotors * v)[1])
+    def set_force(self, force: Array) -> None:
+        push = self.rotors[self.order.v] * self.skeleton.getVelocities()
+        self.skeleton.setForces(force + push)
 
-    def engine_step(self) -> None:
+    def step(self) -> None:
         self.world.step()
 
-    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
-        self.set_force(force, v)
-        self.engine_step()
-        x = self.skeleton.getPositions()
-        self.q = np.empty_like(self.q)
-        self.q[self.order.q] = x
-        for at, place in self.order.turned:
-            self.q[place] = np.roll(Rotation.from_rotvec(x[at]).as_quat(), 1)
-        return self.q, self.order.tree(self.q, self.skeleton.getVelocities())
+    def reached(self) -> tuple[Array, Array]:
+        return self.skeleton.getPositions(), self.skeleton.getVelocities()
 
-    def mass_matrix(self, q: Array) -> Array:
-        self.set_state(q, np.zeros(len(self.armature)))
-        return self.order.tree_matrix(q, self.skeleton.getMassMatrix()) + np.diag(self.armature)
+    def mass_matrix(self, at: State) -> Array:
+        self.set_state(at)
+        return np.asarray(self.skeleton.getMassMatrix() + self.armature_matrix())
 
-    def bias(self, q: Array, v: Array) -> Array:
-        self.set_state(q, v)
-        return self.order.tree(q, self.skeleton.getCoriolisAndGravityForces())
-
-    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        self.start_at(q, v, 1.0, np.zeros_like(v))
-        self.set_force(force, v)
-        self.skeleton.computeForwardDynamics()
-        return self.order.tree(q, self.skeleton.getAccelerations())
+    def bias(self, at: State) -> Array:
+        self.set_state(at)
+        return np.array(self.skeleton.getCoriolisAndGravityForces())

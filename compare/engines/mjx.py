@@ -12,9 +12,10 @@ import numpy as np
 from tmt import Tree
 
 from . import Array, Course, EngineRecord
-from .outside.model import File
+from .outside.file import File
 from .outside.of_compiled import METHODS as METHODS
-from .outside.of_compiled import STAGES, OfCompiled
+from .outside.of_compiled import OfCompiled
+from .outside.order import State
 
 if TYPE_CHECKING:
     from .mujoco.handed_on import Bare
@@ -60,73 +61,55 @@ class Model(OfCompiled):
         return model.replace(**{name: 0.0 * getattr(model, name) for name in STIFFNESS_AND_DAMPING})
 
     def held(self, name: str) -> Array:
-        return np.array(getattr(self.models["Euler"], name))
+        return np.array(attrgetter(name)(self.models["Euler"]))
 
-    def gravity(self) -> Array:
-        return np.asarray(self.models["Euler"].opt.gravity)
+    def values(self, at: State, force: Array | None = None) -> tuple[Array, ...]:
+        """M, h and the acceleration."""
+        force = np.zeros_like(at.u) if force is None else force
+        state = (values.astype(self.precision) for values in (at.x, at.u, force))
+        return tuple(map(np.asarray, functions()["values"](self.model, self.data, *state)))
 
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        field = np.array(attrgetter(name)(model))
-        field[index] = values
-        return model.tree_replace({name: field})
+    def mass_matrix(self, at: State) -> Array:
+        return self.values(at)[0]
 
-    def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
-        """The arguments in MuJoCo's order of joints."""
-        placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
-        placed[0][..., self.bare.qpos] = q
-        for vector, values in zip(placed[1:], of_speeds):
-            vector[..., self.bare.dofs] = values
-        return placed
+    def bias(self, at: State) -> Array:
+        return self.values(at)[1]
 
-    def values(self, q: Array, v: Array, force: Array) -> tuple[Array, ...]:
-        M, h, a = functions()["values"](self.model, self.data, *self.placed(q, v, force))
-        at = self.bare.dofs
-        return np.asarray(M)[np.ix_(at, at)], np.asarray(h)[at], np.asarray(a)[at]
+    def acceleration(self, at: State, force: Array) -> Array:
+        return self.values(at, force)[2]
 
-    def mass_matrix(self, q: Array) -> Array:
-        zero = np.zeros(len(self.bare.dofs))
-        return self.values(q, zero, zero)[0]
-
-    def bias(self, q: Array, v: Array) -> Array:
-        return self.values(q, v, np.zeros_like(v))[1]
-
-    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        return self.values(q, v, force)[2]
+    def with_step(self, model: Any, dt: float) -> Any:
+        return model.tree_replace({"opt.timestep": np.asarray(dt, self.precision)})
 
     def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
         """On the first device that JAX has, which may be a GPU."""
         import jax
 
-        device, dt = jax.devices()[0], np.asarray(course.dt, self.precision)
-        model = self.models[course.method].tree_replace({"opt.timestep": dt})
-        arguments = model, self.data, *self.placed(course.q, course.v, course.tau)
-        on_device = jax.device_put(arguments, device)
+        device, model = jax.devices()[0], self.with_step(self.models[course.method], course.dt)
+        start = self.placed(course.q, course.v, course.tau)
+        arguments = jax.device_put((model, self.data, *start), device)
 
-        def run() -> Array:
-            qpos, _ = functions()["worlds"](*on_device, course.steps)
+        def ends() -> Array:
+            qpos, _ = functions()["worlds"](*arguments, course.steps)
             return np.asarray(qpos.block_until_ready()[0, 0])[self.bare.qpos]
 
-        return run, str(device.device_kind)
+        return ends, str(device.device_kind)
 
     @property
-    def lacks(self) -> tuple[str, ...]:
-        has_quaternions = len(self.bare.qpos) > len(self.bare.dofs)  # which do not move like numbers
-        return ("derivatives",) if has_quaternions else ()
+    def quantities(self) -> tuple[str, ...]:
+        """Quaternions do not move like numbers."""
+        return super().quantities + ("derivatives",) * (not self.file.coordinates.has_balls)
 
-    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
-        by = functions()["derivatives"](self.model, self.data, *self.placed(q, v, force))
-        rows, at = self.bare.dofs, (self.bare.qpos, self.bare.dofs, self.bare.dofs)
-        return np.array([np.asarray(matrix)[np.ix_(rows, columns)] for matrix, columns in zip(by, at)])
+    def derivatives(self, at: State, force: Array) -> Array:
+        state = (values.astype(self.precision) for values in (at.x, at.u, force))
+        return np.array(functions()["derivatives"](self.model, self.data, *state))
 
-    def run(self, course: Course) -> tuple[Array, int]:
-        dt = np.asarray(course.dt, self.precision)
-        bare, model, tau = self.of_course(course)
+    def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
         data = self.data if bare is self.bare else self.made_data(bare)
-        model, start = model.tree_replace({"opt.timestep": dt}), self.placed(course.q, course.v, tau)
+        model = self.with_step(model, course.dt)
         path = functions()["path"](model, data, *start, course.every, records=len(course.times) - 1)
         qpos, qvel = map(np.asarray, path)
-        states = np.hstack([qpos[:, self.bare.qpos], qvel[:, self.bare.dofs]])
-        return np.vstack([course.start, states]), course.steps * STAGES[course.method]
+        return qpos, qvel
 
 
 @cache

@@ -1,7 +1,6 @@
 """Pinocchio: its model of a robot's file.
 
-Its quaternions are x y z w; a continuous joint has the cosine and the sine of its angle. The velocity of a free body is in body
-axes: where the Tree has v and a, it has R' v and R' a - w x R' v. Of several root bodies it reads the first one only.
+A continuous joint has the cosine and the sine of its angle. Of several root bodies it reads the first one only.
 """
 
 from pathlib import Path
@@ -9,18 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from . import Array, EngineRecord
+from .outside.bodies import Body, Link, Numbers
+from .outside.file import File, OtherJoints, OtherNames
 from .outside.mjcf_text import original_or_copy
-from .outside.model import Body, File, Link, Numbers, OtherJoints, OtherNames, ReadModel
-from .outside.order import order_of
+from .outside.model import ReadModel
+from .outside.order import XYZW, Order, State, of_free
 
 ENGINE = EngineRecord(
     order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", reads_file=True
 )
 METHODS: dict[str, tuple[int, str]] = {}  # it has no integrators
+FREE = "JointModelFreeFlyer"
 
 
 class Model(ReadModel):
-    has_places = True
+    has_links = True
     drops = ("damping", "stiffness")  # aba applies no damping, and its model has no springs
 
     def __init__(self, file: File, precision: str):
@@ -31,53 +33,47 @@ class Model(ReadModel):
         self.data = self.model.createData()
 
     def read(self, path: Path) -> None:
-        """The model of a URDF or MJCF file; Unread where its joints are not those of the compared model."""
+        """The model of a URDF or MJCF file; OtherJoints where its joints are not those of the compared model."""
         is_urdf = path.suffix == ".urdf"
         build = self.pinocchio.buildModelFromUrdf if is_urdf else self.pinocchio.buildModelFromMJCF
         # a base that --floating has freed
         is_freed = self.file.floating and 'type="floating"' not in path.read_text(encoding="utf-8")
-        base = [self.pinocchio.JointModelFreeFlyer()] if is_freed else []
-        self.model, file = build(str(path), *base), self.file
+        self.model = build(str(path), *[self.pinocchio.JointModelFreeFlyer()] * is_freed)
         self.last: dict[int, int] = {}  # the number in the Tree of the last joint of each of Pinocchio's
-        starts, circles, q = {}, [], 0  # where each joint begins; which angles are continuous
-        for number, (name, joint) in enumerate(zip(self.model.names, self.model.joints)):
-            if number == 0:  # the world
-                continue
-            name = file.free[0] if is_freed and number == 1 else name
-            is_composite, name = joint.shortname() == "JointModelComposite", name.removeprefix("Composite_")
-            v, name = joint.idx_v, f"{name} turn" if name in file.free else name
-            for part in joint.extract().joints if is_composite else [joint]:
-                if name not in file.names:
-                    raise OtherNames(f"the file has no joint {name!r}")
-                self.last[number] = k = file.names.index(name)
-                is_circle = part.nq == 2
-                circles += [q] if is_circle else []
-                starts[k], q, v = (q, v), q + (1 if is_circle else part.nq), v + part.nv
-                name = file.names[min(k + 1, len(file.names) - 1)]  # of the next one of a composite joint
-        self.circles, self.starts = np.array(circles, int), starts
-        if self.model.nv != file.coordinates.nv:
-            raise OtherJoints(f"it has {self.model.nv} speeds, the file {file.coordinates.nv}")
-        self.order = order_of(
-            file, starts, (0, 1, 2, 4, 5, 6, 3), range(6), in_world=False, ball_q=(1, 2, 3, 0)
-        )
+        starts: dict[int, tuple[int, int]] = {}
+        circles, free = [], iter(self.file.free)
+        for number, joint in list(enumerate(self.model.joints))[1:]:  # without the world
+            parts = joint.extract().joints if joint.shortname() == "JointModelComposite" else [joint]
+            name = self.model.names[number].removeprefix("Composite_")
+            # one without a name is called by its body here, and as MuJoCo numbers it there
+            name = f"{next(free, name)} turn" if joint.shortname() == FREE else name
+            if name not in self.file.names:
+                raise OtherNames(f"the file has no joint {name!r}")
+            q, v, k = joint.idx_q, joint.idx_v, self.file.names.index(name)
+            for part in parts:
+                is_free, self.last[number] = part.nv == 6, k
+                starts |= of_free(k, (q, v), (q + 3, v + 3)) if is_free else {k: (q, v)}
+                circles += [k] * (part.nq == 2)
+                q, v, k = q + part.nq, v + part.nv, k + 1
+        if self.model.nv != self.file.coordinates.nv:
+            raise OtherJoints(f"it has {self.model.nv} speeds, the file {self.file.coordinates.nv}")
+        self.order = Order(self.file, starts, XYZW, XYZW, linear_in_world=False, circles=tuple(circles))
 
-    def own(self, q: Array, *vectors: Array) -> list[Array]:
-        """q, and vectors of speeds or forces, as Pinocchio has them."""
-        q, *placed = self.order.engine(q, *vectors)
-        if self.circles.size:
-            sines, q[self.circles] = np.sin(q[self.circles]), np.cos(q[self.circles])
-            q = np.insert(q, self.circles + 1, sines)
-        return [q, *placed]
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Movements of a free body are in other axes; of a composite joint Pinocchio 4.1 has wrong derivatives."""
+        composite = any(joint.shortname() == "JointModelComposite" for joint in self.model.joints)
+        return super().quantities + ("derivatives",) * (not self.file.free and not composite)
 
     def fields(self) -> Numbers:
-        armature, damping = np.zeros((2, self.model.nv))
-        armature[self.order.v], damping[self.order.v] = self.model.armature, self.model.damping
-        gravity = self.model.gravity.linear
-        return {"gravity": gravity, "armature": armature, "damping": damping}
+        armature, damping = (
+            self.order.tree_numbers(getattr(self.model, name)) for name in ("armature", "damping")
+        )
+        return {"gravity": self.model.gravity.linear, "armature": armature, "damping": damping}
 
-    def links(self, q: Array) -> list[Link]:
+    def links(self, at: State) -> list[Link]:
         """Those that Pinocchio's joints move."""
-        self.pinocchio.forwardKinematics(self.model, self.data, *self.own(q))
+        self.pinocchio.forwardKinematics(self.model, self.data, at.x)
         links = []
         for number, k in self.last.items():
             inertia, place = self.model.inertias[number], self.data.oMi[number]
@@ -85,8 +81,9 @@ class Model(ReadModel):
             links.append(Link(number, None, k, place.rotation.copy(), place.translation.copy(), body))
         return links
 
-    def set_body(self, link: Link, body: Body) -> None:
+    def set_body(self, link: Link, body: Body) -> bool:
         self.model.inertias[link.name] = self.pinocchio.Inertia(*body)
+        return True
 
     def set_field(self, name: str, values: Array) -> bool:
         if name == "gravity":
@@ -95,38 +92,21 @@ class Model(ReadModel):
             setattr(self.model, name, values[self.order.v])
         return True
 
-    def mass_matrix(self, q: Array) -> Array:
-        upper = np.triu(self.pinocchio.crba(self.model, self.data, *self.own(q)))
-        return self.order.tree_matrix(q, upper + np.triu(upper, 1).T)
+    def mass_matrix(self, at: State) -> Array:
+        return symmetric(self.pinocchio.crba(self.model, self.data, at.x))
 
-    def turning(self, v: Array) -> Array:
-        """The acceleration that Pinocchio's speeds have where those of the Tree have none: -w x v of a free body."""
-        turning = np.zeros_like(v)
-        for at, _ in self.order.turned:
-            turning[at] = np.cross(v[at], v[at.stop : at.stop + 3])
-        return turning
+    def bias(self, at: State) -> Array:
+        return np.array(self.pinocchio.rnea(self.model, self.data, at.x, at.u, at.c))
 
-    def bias(self, q: Array, v: Array) -> Array:
-        q_own, v_own = self.own(q, v)
-        return self.order.tree(
-            q, self.pinocchio.rnea(self.model, self.data, q_own, v_own, self.turning(v_own))
-        )
+    def acceleration(self, at: State, force: Array) -> Array:
+        return np.array(self.pinocchio.aba(self.model, self.data, at.x, at.u, force))
 
-    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        q_own, v_own, force = self.own(q, v, force)
-        a_own = self.pinocchio.aba(self.model, self.data, q_own, v_own, force) - self.turning(v_own)
-        return self.order.tree(q, a_own)
+    def derivatives(self, at: State, force: Array) -> Array:
+        by = self.pinocchio.computeABADerivatives(self.model, self.data, at.x, at.u, force)
+        return np.array([by[0], by[1], symmetric(by[2])])
 
-    @property
-    def lacks(self) -> tuple[str, ...]:
-        """Movements of a free body are in other axes; of a composite joint Pinocchio 4.1 has wrong derivatives."""
-        composite = any(joint.shortname() == "JointModelComposite" for joint in self.model.joints)
-        return ("derivatives",) if self.file.free or composite else ()
 
-    def derivatives(self, q: Array, v: Array, force: Array) -> Array:
-        by = self.pinocchio.computeABADerivatives(self.model, self.data, *self.own(q, v, force))
-        upper = np.triu(by[2])
-        matrices = np.array([by[0], by[1], upper + np.triu(upper, 1).T])
-        placed = np.empty_like(matrices)
-        placed[:, self.order.v[:, None], self.order.v] = matrices
-        return placed
+def symmetric(matrix: Array) -> Array:
+    """The matrix of an upper triangle."""
+    upper = np.triu(matrix)
+    return np.asarray(upper + np.triu(upper, 1).T)

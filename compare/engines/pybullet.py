@@ -1,69 +1,71 @@
 """PyBullet, through a URDF text of the model that MuJoCo compiled: its reader of MJCF loses joints.
 
 It has no forward dynamics but its step, and no armature, which can only be added to M: a robot with armature has no accelerations
-and no runs here.
+and no runs here. A free base is the root link, with the centre of mass as origin and principal axes; angular speeds come first.
+In the mass matrix and in inverse dynamics they are in these axes; the latter returns the linear forces first, and takes roll,
+pitch and yaw of the given quaternion as angles about the base's own axes.
 """
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from xml.etree import ElementTree
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, Course, EngineRecord
-from .outside.model import Body, File, Link
+from . import Array, EngineRecord
+from .outside.file import Unwritten
 from .outside.of_urdf import OfUrdf
+from .outside.order import XYZW, Order, State, of_free
 
 ENGINE = EngineRecord(
     order=80, label="PyBullet", colour="#661100", marker="d", package="pybullet", reads_file=True
 )
 METHODS = {"semi-implicit Euler": (1, "semi_implicit_euler")}
+BASE = -1  # the number of the root link
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
-    """Its damping is explicit."""
+    """Its damping is explicit; its step adds to the angular velocity of a free base in world axes."""
     if any(tree.armature):
         return {}
+    if tree.coordinates.balls:
+        return {"semi-implicit Euler": (1, "pybullet_semi_implicit_euler")}
     return {"semi-implicit Euler": (1, "explicit_damping_euler")} if any(tree.damping) else METHODS
 
 
 class Model(OfUrdf):
-    def load(self, text: str, file: File) -> Array:
+    def load(self, text: str) -> None:
         import pybullet
         from pybullet_utils.bullet_client import BulletClient
 
-        self.bullet = BulletClient(pybullet.DIRECT)
+        self.bullet, self.free = BulletClient(pybullet.DIRECT), len(self.file.free)
         with TemporaryDirectory() as folder:
-            (Path(folder) / "robot.urdf").write_text(text)
+            (Path(folder) / "robot.urdf").write_text(without_world(text) if self.free else text)
             flags = self.bullet.URDF_USE_INERTIA_FROM_FILE
-            self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, flags=flags)
-        # of the links, and of the joints that move them
+            self.robot = self.bullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=not self.free, flags=flags)
         numbers = range(self.bullet.getNumJoints(self.robot))
-        self.infos = [self.bullet.getJointInfo(self.robot, link) for link in numbers]
-        by_name = {info[1].decode(): info for info in self.infos}
-        self.link_numbers = [by_name[name][0] for name in file.names]
-        self.order = np.argsort(self.link_numbers)  # the Tree's joints in PyBullet's vectors
-        for link in numbers:
+        named = {self.bullet.getJointInfo(self.robot, link)[1].decode(): link for link in numbers}
+        # the joints of the Tree by the links that they move, without a free base
+        joints = dict(sorted((named[name], k) for k, name in enumerate(self.file.names) if name in named))
+        starts = {k: (7 * self.free + i, 6 * self.free + i) for i, k in enumerate(joints.values())}
+        self.moved, points = list(joints), dict[int, Array]()
+        for ball in filter(self.file.is_free, range(len(self.file.names))):
+            *_, centre, axes = self.bullet.getDynamicsInfo(self.robot, BASE)[:5]
+            self.centre, self.axes = np.array(centre), Rotation.from_quat(axes)
+            starts |= of_free(ball, (0, 3), (3, 0))
+            points[ball] = self.centre
+        self.order = Order(self.file, starts, free=XYZW, angular_in_world=True, points=points)
+        for link in (BASE, *numbers):
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
-        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(file.names)))
-        return np.array([by_name[name][6] for name in file.names])
+        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(self.moved)))
 
     def apply(self, mode: int, forces: Array) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
-        self.bullet.setJointMotorControlArray(self.robot, self.link_numbers, mode, forces=forces.tolist())
-
-    def links(self, q: Array) -> list[Link]:
-        joints, links = {link: k for k, link in enumerate(self.link_numbers)}, []
-        for number, info in enumerate(self.infos):
-            mass, _, moments, *_ = self.bullet.getDynamicsInfo(self.robot, number)
-            centre, turn, *_ = self.bullet.getLinkState(self.robot, number, computeForwardKinematics=True)
-            body = Body(mass, np.zeros(3), np.diag(moments))  # axes and origin are those of the inertia
-            R = Rotation.from_quat(turn).as_matrix()
-            links.append(Link(number, info[16], joints.get(number), R, np.array(centre), body))
-        return links
+        self.bullet.setJointMotorControlArray(self.robot, self.moved, mode, forces=forces.tolist())
 
     def gravity(self) -> Array:
         engine = self.bullet.getPhysicsEngineParameters()
@@ -73,40 +75,85 @@ class Model(OfUrdf):
         self.bullet.setGravity(*gravity)
 
     @property
-    def lacks(self) -> tuple[str, ...]:
-        return ("acceleration",) if self.armature.any() else ()
+    def quantities(self) -> tuple[str, ...]:
+        return super().quantities[: 2 if self.read["armature"].any() else 3]
 
-    def mass_matrix(self, q: Array) -> Array:
-        M, own = np.empty((len(q), len(q))), q[self.order].tolist()
-        M[np.ix_(self.order, self.order)] = self.bullet.calculateMassMatrix(self.robot, own)
-        return M + np.diag(self.armature)
+    def base(self, x: Array) -> tuple[Array, Rotation]:
+        """The position of the centre of mass and the principal axes of a free base."""
+        turn = Rotation.from_quat(x[3:7])
+        return x[:3] + turn.apply(self.centre), turn * self.axes
 
-    def bias(self, q: Array, v: Array) -> Array:
-        h, zero = np.empty_like(q), [0.0] * len(q)
-        state = q[self.order].tolist(), v[self.order].tolist()
-        h[self.order] = self.bullet.calculateInverseDynamics(self.robot, *state, zero)
-        return h
+    def split(self, x: Array) -> tuple[Array, Array]:
+        """Positions of the joints, and (nv, nv): speeds in the axes of the base from those in the world's."""
+        T = np.eye(len(self.order.v))
+        if self.free:
+            T[:3, :3] = T[3:6, 3:6] = self.base(x)[1].as_matrix().T
+        return x[7 * self.free :], T
 
-    def start(self, course: Course) -> None:
-        self.start_at(course.q, course.v, course.dt, self.damping)
+    def mass_matrix(self, at: State) -> Array:
+        q, T = self.split(at.x)
+        M = T.T @ np.array(self.bullet.calculateMassMatrix(self.robot, q.tolist())) @ T
+        return np.asarray(M + self.armature_matrix())
 
-    def start_at(self, q: Array, v: Array, dt: float, damping: Array) -> None:
-        """Prepare steps of dt from a state, with this damping of the joints."""
+    def bias(self, at: State) -> Array:
+        q, T = self.split(at.x)
+        if self.free:
+            place, axes = self.base(at.x)
+            q = np.concatenate([place, Rotation.from_euler("xyz", axes.as_euler("XYZ")).as_quat(), q])
+        state = (values.tolist() for values in (q, T @ at.u, T @ at.c))
+        h = np.array(self.bullet.calculateInverseDynamics(self.robot, *state))
+        if self.free:
+            h[:6] = np.roll(h[:6], 3)
+        return T.T @ h
+
+    def start(self, at: State, dt: float, method: str | None) -> None:
         self.bullet.setTimeStep(dt)
-        for link, coefficient, *state in zip(self.link_numbers, damping, q, v):
+        damping = np.zeros_like(at.u) if method is None else self.stated["damping"][self.order.v]
+        (q, _), free = self.split(at.x), 6 * self.free
+        for link, coefficient, *state in zip(self.moved, damping[free:], q, at.u[free:]):
             self.bullet.changeDynamics(self.robot, link, jointDamping=coefficient)
             self.bullet.resetJointState(self.robot, link, *state)
+        if free:
+            place, axes = self.base(at.x)
+            self.bullet.resetBasePositionAndOrientation(self.robot, place, axes.as_quat())
+            self.bullet.resetBaseVelocity(self.robot, at.u[3:6], at.u[:3])
 
-    def engine_step(self) -> None:
+    def set_force(self, force: Array) -> None:
+        free = 6 * self.free
+        self.apply(self.bullet.TORQUE_CONTROL, force[free:])
+        if free:
+            place, _ = self.bullet.getBasePositionAndOrientation(self.robot)
+            in_world = self.bullet.WORLD_FRAME
+            self.bullet.applyExternalForce(self.robot, BASE, force[3:6], place, in_world)
+            self.bullet.applyExternalTorque(self.robot, BASE, force[:3], in_world)
+
+    def step(self) -> None:
         self.bullet.stepSimulation()
 
-    def step(self, force: Array, v: Array) -> tuple[Array, Array]:
-        self.apply(self.bullet.TORQUE_CONTROL, force)
-        self.engine_step()
-        states = self.bullet.getJointStates(self.robot, self.link_numbers)
-        q, v = np.array([state[:2] for state in states]).T
+    def reached(self) -> tuple[Array, Array]:
+        states = self.bullet.getJointStates(self.robot, self.moved) or ()  # None of no joints
+        q, v = np.array([state[:2] for state in states]).reshape(-1, 2).T
+        if self.free:
+            place, axes = self.bullet.getBasePositionAndOrientation(self.robot)
+            turn = Rotation.from_quat(axes) * self.axes.inv()
+            linear, angular = self.bullet.getBaseVelocity(self.robot)
+            q, v = np.r_[place - turn.apply(self.centre), turn.as_quat(), q], np.r_[angular, linear, v]
         return q, v
 
-    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        self.start_at(q, v, 1.0, np.zeros_like(v))
-        return self.step(force, v)[1] - v
+
+def without_world(text: str) -> str:
+    """A URDF whose root is the link of its floating joint; Unwritten if other joints stand on the world."""
+    robot = ElementTree.fromstring(text)
+    carried: set[str] = set()
+    for joint in robot.findall("joint"):
+        parent, child = (next(joint.iter(tag)).attrib["link"] for tag in ("parent", "child"))
+        if parent in carried or (joint.get("type") == "floating" and not carried):
+            carried.add(child)
+        elif joint.get("type") != "fixed":
+            raise Unwritten("joints stand on the world beside a free base")
+        if parent not in carried:
+            robot.remove(joint)
+    for link in robot.findall("link"):
+        if link.attrib["name"] not in carried:
+            robot.remove(link)
+    return ElementTree.tostring(robot, encoding="unicode")

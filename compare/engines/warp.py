@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from operator import attrgetter
@@ -13,11 +13,11 @@ import numpy as np
 from tmt import Tree
 from tmt.methods import lone_speeds
 
-from ..robots.actuators import Controller
 from . import Array, Course, EngineRecord
-from .outside.model import File
+from .outside.file import File
 from .outside.of_compiled import METHODS as OF_MJX
-from .outside.of_compiled import STAGES, OfCompiled
+from .outside.of_compiled import OfCompiled
+from .outside.order import State
 
 if TYPE_CHECKING:
     from .mujoco.handed_on import Bare
@@ -50,29 +50,12 @@ class Model(OfCompiled):
         self.worlds: dict[tuple[int, int, str], Any] = {}
         self.graphs: dict[tuple[Any, ...], Any] = {}
 
-    def made_bare(self, controller: Controller | None) -> Bare:
-        bare = super().made_bare(controller)
-        if controller is None:
-            bare.model.opt.iterations = 0  # of its solver of constraints
-        return bare
-
     def put_model(self, model: Any) -> Any:
         return self.engine.put_model(model)
 
     def held(self, name: str) -> Array:
-        field = getattr(self.models["Euler"], name)
-        values: Array = field.numpy()
-        return values[0] if field.ndim > 1 else values  # all worlds share the first
-
-    def gravity(self) -> Array:
-        return np.array(self.models["Euler"].opt.gravity.numpy()[0])
-
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        field = attrgetter(name)(model)
-        numbers = field.numpy()
-        numbers[0, index] = values
-        field.assign(numbers)
-        return model
+        values: Array = attrgetter(name)(self.models["Euler"]).numpy()
+        return values[0]  # all worlds share it
 
     @cached_property
     def model(self) -> Any:
@@ -81,20 +64,17 @@ class Model(OfCompiled):
         none = [self.warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
         return replace(model, dof_damping=none[0], jnt_stiffness=none[1])
 
-    def at(self, q: Array, v: Array, force: Array, bare: Bare | None = None) -> Any:
-        """Data of as many worlds as there are states, at these states (worlds, n). bare: with actuators that act."""
+    def data_at(self, start: Sequence[Array], bare: Bare | None = None) -> Any:
+        """Data of as many worlds as there are states qpos, qvel and force (worlds, n). bare: with actuators that act."""
         source = bare or self.bare
-        key = id(source), len(q), str(self.warp.get_device())
+        key = id(source), len(start[0]), str(self.warp.get_device())
         if key not in self.worlds:
             # njmax=0 is possible, but then Euler and implicitfast do not accelerate
-            self.worlds[key] = self.engine.make_data(source.model, len(q), nconmax=0, njmax=1)
-        data = self.worlds[key]
-        for field, values in ((data.ctrl, source.engaged.ctrl), (data.act, source.engaged.act)):
+            self.worlds[key] = self.engine.make_data(source.model, len(start[0]), nconmax=0, njmax=1)
+        data, controls = self.worlds[key], source.engaged
+        fields = data.qpos, data.qvel, data.qfrc_applied, data.ctrl, data.act
+        for field, values in zip(fields, (*start, controls.ctrl, controls.act)):
             field.assign(np.broadcast_to(np.asarray(values, np.float32), field.shape))
-        for field, values in ((data.qpos, q), (data.qvel, v), (data.qfrc_applied, force)):
-            placed = np.zeros(field.shape, np.float32)
-            placed[:, self.bare.qpos if field is data.qpos else self.bare.dofs] = values
-            field.assign(placed)
         return data
 
     def replay(self, name: str, call: Callable[[Any], object], data: Any) -> Callable[[], None]:
@@ -107,53 +87,52 @@ class Model(OfCompiled):
             self.graphs[key] = capture.graph
         return lambda: self.warp.capture_launch(self.graphs[key])
 
-    def forward(self, q: Array, v: Array, force: Array) -> Any:
-        """Data after forward dynamics at states (worlds, n)."""
-        data = self.at(q, v, force)
+    def forward(self, at: State, force: Array | None = None) -> Any:
+        """Data after forward dynamics at a state."""
+        force = np.zeros_like(at.u) if force is None else force
+        data = self.data_at([at.x[None], at.u[None], force[None]])
         self.replay("forward", lambda data: self.engine.forward(self.model, data), data)()
         return data
 
-    def mass_matrix(self, q: Array) -> Array:
-        zero, model, at = np.zeros((1, len(self.bare.dofs))), self.model, self.bare.dofs
-        row, column = np.repeat(np.arange(zero.size), model.M_rownnz.numpy()), model.M_colind.numpy()
-        M = np.zeros((zero.size, zero.size))  # its lower triangle is given, row by row
-        M[row, column] = M[column, row] = self.forward(q[None], zero, zero).M.numpy()[0]
-        return M[np.ix_(at, at)]
+    def mass_matrix(self, at: State) -> Array:
+        M, model = np.zeros((at.u.size, at.u.size)), self.model
+        row, column = np.repeat(np.arange(at.u.size), model.M_rownnz.numpy()), model.M_colind.numpy()
+        M[row, column] = M[column, row] = self.forward(at).M.numpy()[0]  # the lower triangle, row by row
+        return M
 
-    def bias(self, q: Array, v: Array) -> Array:
-        return self.forward(q[None], v[None], np.zeros_like(v[None])).qfrc_bias.numpy()[0, self.bare.dofs]
+    def bias(self, at: State) -> Array:
+        return np.array(self.forward(at).qfrc_bias.numpy()[0])
 
-    def acceleration(self, q: Array, v: Array, force: Array) -> Array:
-        return self.forward(q[None], v[None], force[None]).qacc.numpy()[0, self.bare.dofs]
+    def acceleration(self, at: State, force: Array) -> Array:
+        return np.array(self.forward(at, force).qacc.numpy()[0])
 
     def step_alone(self, course: Course) -> Callable[[], None]:
-        return self.begun(course)[0]
-
-    def begun(self, course: Course) -> tuple[Callable[[], None], Any]:
-        """A step from the start of a run and on, by the kernels that were recorded, and the data."""
         bare, model, tau = self.of_course(course)
-        start = course.q[None], course.v[None], tau[None], bare if course.servos else None
-        data = self.at(*start)
+        return self.begun(bare, model, self.placed(course.q, course.v, tau), course)[0]
+
+    def begun(
+        self, bare: Bare, model: Any, start: list[Array], course: Course
+    ) -> tuple[Callable[[], None], Any]:
+        """A step from a start and on, by the kernels that were recorded, and the data. start: of a world or of several."""
+        worlds = [np.atleast_2d(values) for values in start]
+        data = self.data_at(worlds, bare)
         model.opt.timestep.fill_(course.dt)
-        call: Callable[[Any], object] = partial(self.engine.step, model)
-        advance = self.replay(course.method, call, data)
-        self.at(*start)  # the recording has moved them
+        advance = self.replay(course.method, partial(self.engine.step, model), data)
+        self.data_at(worlds, bare)  # the recording has moved them
         return advance, data
 
     def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
         """On Warp's preferred device, which may be a GPU; each step is a graph of kernels that was recorded once."""
-        device = self.warp.get_preferred_device()
+        device, start = self.warp.get_preferred_device(), self.placed(course.q, course.v, course.tau)
         with self.warp.ScopedDevice(device):
             model = self.models[course.method]
             if not device.is_cpu:
-                model = self.with_all_fields(self.made_models(self.bare))[course.method]
-            data = self.at(course.q, course.v, course.tau)
-            model.opt.timestep.fill_(course.dt)
-            advance = self.replay(course.method, partial(self.engine.step, model), data)
+                model = self.made_models(self.bare)[course.method]
+            advance, data = self.begun(self.bare, model, start, course)
 
         def run() -> Array:
             with self.warp.ScopedDevice(device):
-                self.at(course.q, course.v, course.tau)
+                self.data_at(start)
                 for _ in range(course.steps):
                     advance()
                 self.warp.synchronize_device(device)
@@ -161,11 +140,11 @@ class Model(OfCompiled):
 
         return run, str(device.name)
 
-    def run(self, course: Course) -> tuple[Array, int]:
-        path, (advance, data) = [course.start], self.begun(course)
+    def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
+        (advance, data), states = self.begun(bare, model, start, course), []
         for _ in course.times[1:]:
             for _ in range(course.every):
                 advance()
-            qpos, qvel = data.qpos.numpy()[0], data.qvel.numpy()[0]
-            path.append(np.hstack([qpos[self.bare.qpos], qvel[self.bare.dofs]]))
-        return np.array(path), course.steps * STAGES[course.method]
+            states.append((data.qpos.numpy()[0], data.qvel.numpy()[0]))
+        qpos, qvel = map(np.array, zip(*states))
+        return qpos, qvel

@@ -68,8 +68,6 @@ class Curve(NamedTuple):
 @dataclass
 class DiagnosisResult(Result):
     curve: Curve | None = None  # of a difference that nothing explains
-    # single changes that leave least: what they leave, a share, and whether it is within the tolerance
-    nearest: tuple[tuple[str, float, bool], ...] = ()
 
 
 class Found(NamedTuple):
@@ -179,7 +177,7 @@ def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
 def rows(setup: Setup) -> DiagnosisResult:
     """A row for each explanation; a check of each condition, of Mbar and h, and of accelerations."""
     found = diagnosed(setup)
-    result = DiagnosisResult("diagnosis", nearest=found.diagnosis.nearest, curve=found.curve)
+    result = DiagnosisResult("diagnosis", curve=found.curve)
     for condition in found.conditions:
         check(result, found, condition)
     if found.alone is None:
@@ -217,9 +215,7 @@ def headline(result: DiagnosisResult) -> Finding | None:
 
 
 def figures(result: DiagnosisResult, robot: Robot) -> Iterator[Drawing]:
-    from .figures import draw_curve, draw_nearest  # matplotlib is for the process that draws
+    from .figures import draw_curve  # matplotlib is for the process that draws
 
-    if result.nearest:
-        yield partial(draw_nearest, result.nearest)
     if result.curve is not None:
         yield partial(draw_curve, *result.curve)

@@ -12,8 +12,8 @@ from matplotlib.patheffects import withStroke
 
 from ..core.check import Result, largest_known
 from ..core.finding import Finding
-from ..judge.scale import EPS, FACTOR
-from ..report.style import BLUE, GREEN, GREY, ORANGE, RED, WIDTH
+from ..judge.scale import FACTOR
+from ..report.style import BLUE, GREEN, ORANGE, RED, WIDTH
 
 SIZE = (4.2, 2.75)  # inches: about 400 px wide on the first screen
 LEAST_EPS, MOST_EPS = 1e-3, 1e6  # eps: where zero, and what is larger, is drawn
@@ -103,25 +103,6 @@ def label_value(ax: Axes, value: float, row: float, colour: str) -> None:
     offset, ha, va = ((-6, 5), "right", "bottom") if value > 1e4 else ((6, 0), "left", "center")
     at = np.clip(value, *ax.get_xlim()), row
     ax.annotate(text, at, offset, textcoords="offset points", fontsize=8, color=colour, ha=ha, va=va)
-
-
-def draw_nearest(nearest: Sequence[tuple[str, float, bool]]) -> tuple[str, Figure, Finding]:
-    """The share of the difference that remains after each of the best single corrections."""
-    names, shares, explains = zip(*nearest)
-    left = np.maximum(shares, EPS)
-    fig = Figure(figsize=(WIDTH, 0.9 + 0.25 * len(names)), layout="constrained")
-    ax, rows = fig.subplots(), np.arange(len(names))
-    looks = ((True, GREEN, "explains the difference down to rounding"), (False, GREY, "does not explain it"))
-    for is_explained, colour, label in looks:
-        shown = np.equal(explains, is_explained)
-        if shown.any():
-            ax.barh(rows[shown], left[shown], color=colour, label=label)
-    ax.set(xscale="log", xlim=(EPS / 3.0, 1.5), xlabel="remaining share of the difference")
-    ax.set_yticks(rows, names)
-    ax.set_ylim(len(names) - 0.5, -0.5)
-    fig.legend(loc="outside upper center", ncols=2)
-    caption = Finding("diagnosis", "nearest", {"names": names[:2], "left": left[:2].tolist()})
-    return "diagnosis_nearest", fig, caption
 
 
 def draw_curve(

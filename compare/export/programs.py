@@ -7,6 +7,7 @@ import shlex
 import shutil
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
@@ -135,8 +136,12 @@ class CProgram(Program):
         cpu = Path("/proc/cpuinfo")
         if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
             return {}
-        names = {flag: f"states{flag.replace('=', '_')}" for flag in OF_PROCESSOR}
-        return {flag: self.of_states(name, "-ffp-contract=fast", flag) for flag, name in names.items()}
+        with ThreadPoolExecutor() as compilers:
+            libraries = compilers.map(self.of_processor, OF_PROCESSOR)
+            return dict(zip(OF_PROCESSOR, libraries))
+
+    def of_processor(self, flag: str) -> ctypes.CDLL:
+        return self.of_states(f"states{flag.replace('=', '_')}", "-ffp-contract=fast", flag)
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")

@@ -99,7 +99,7 @@ class Report(NamedTuple):
     def answer(self) -> list[str]:
         """The last lines of a run of one experiment: what is said of the robot, else its number."""
         numbers = [headline(section) for section in self.sections if section.result.checks]
-        return self.top or [f"{capital(number)}." for number in numbers]
+        return self.top or [f"{capital(number)}." for number in numbers if number]
 
 
 class Failures(NamedTuple):

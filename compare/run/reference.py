@@ -105,6 +105,8 @@ class Compared(NamedTuple):
             asked["controls"] = read_controls(asked["controls"], names)
         if asked["write"] and not Path(asked["write"]).absolute().parent.is_dir():
             raise ModelError(f"cannot write {asked['write']}: there is no such folder")
+        if asked["write"] and Path(asked["write"]).resolve() == Path(str(self.reading.source)).resolve():
+            raise ModelError(f"cannot write {asked['write']}: it is the file of the robot itself")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 

@@ -1,7 +1,7 @@
 """The answer for a file: rows of limits at its postures, by the derivative of its step, in closed form and in runs."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,35 +10,35 @@ from ..core.rows import Row, column
 from ..engines.mujoco.forces import rows_at
 from ..engines.mujoco.names import INTEGRATORS, contact_name
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.step import Step
 from ..engines.mujoco.variants import has_free_base
 from . import runs
 from .closed_form import radius_apart
 from .cures import Cure, cures
-from .growth import LASTS, Growth
+from .growth import Growth
 from .limits import LONGEST, Limit, limit, tried
 from .place import MOVING, Place, Posture, in_the_air_at, standing_at
 from .rest import SETTLED, Rest
 
+UNHELD = 0.99  # of a limit: lower ones without dry friction
 SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
 CURVE_RUNS = 0.8, 1.05, 1.15, 1.4, 2.0  # of a limit: steps of runs beside its curve
 
 
-def step_column(**more: Any) -> Any:
+def step_column(digits: int = 4, **more: Any) -> Any:
     """A field with a time step, s."""
-    return column("s", digits=4, **more)
+    return column("s", digits=digits, **more)
 
 
 @dataclass(kw_only=True)
 class StepLimitRow(Row):
     """The step limit of an integrator at a posture: step_limits.csv.
 
-    limit: finite, none, below, saddle, or no_rest, see limits.Limit; moving, it creeps too fast for a rest.
-    observed_dt, failing_dt: the longest step at which runs
-    hold and the shortest at which they fail. own_dt: beyond it the file's own run, from where it sinks to, fails.
-    smooth_dt: the limit without dry friction. growth: per step, at the file's step; apart: in closed form minus that.
-    growth_rate: just beyond the limit; of a saddle that of its fall. finer_push: whether a finer step bears no larger push,
-    asked below the usual push. moved: from the posture to the rest. has_fallen: by a free body.
+    limit: finite, none, below, saddle, or no_rest, see limits.Limit; moving, it moves on where others rest.
+    observed_dt, failing_dt: the longest step at which runs hold and the shortest at which they fail; failing_dt alone is None
+    where they hold up to the longest that is tried.
+    smooth_dt: the limit without dry friction, where that is lower. growth: per step, at the file's step; apart: in closed form
+    minus that. growth_rate: just beyond the limit; of a saddle that of its fall. finer_push: whether a finer step bears no
+    larger push, asked below the usual push. moved: from the posture to the rest. has_fallen: by a free body.
     held_objects: loose objects that move on, held where they are. Speeds are in rad/s or m/s, movements in rad or m.
     """
 
@@ -50,11 +50,10 @@ class StepLimitRow(Row):
     predicted_dt: float | None = step_column()
     observed_dt: float | None = step_column(default=None)
     failing_dt: float | None = step_column(default=None)
-    own_dt: float | None = step_column(default=None)
     smooth_dt: float | None = step_column(default=None)
     file_dt: float = column("s")
     file_integrator: str
-    stable_at_file_dt: bool | None
+    stable_at_file_dt: bool | None = None
     limiting_joint: str = ""
     limiting_contact: str = ""
     growth_rate: float | None = column("per_s", default=None)
@@ -70,22 +69,13 @@ class StepLimitRow(Row):
     held_objects: str = ""
 
     @property
-    def contradicted(self) -> bool:
-        """Whether runs near rest hold or fail elsewhere than at the limit of the derivative."""
-        if self.limit != "finite" or not self.predicted_dt or self.observed_dt is self.failing_dt is None:
-            return False
-        holds = self.observed_dt is not None and self.observed_dt >= 0.95 * self.predicted_dt
-        fails = self.failing_dt is not None and self.failing_dt <= 1.05 * self.predicted_dt
-        return not (holds and fails)
-
-    @property
     def is_known(self) -> bool:
         return self.limit in ("finite", "none", "below", "moving")
 
     @property
     def is_held_by_friction(self) -> bool:
         """Whether the limit is lower without dry friction, which holds small deviations at any step."""
-        return self.smooth_dt is not None and self.smooth_dt < 0.99 * self.longest
+        return self.smooth_dt is not None and self.smooth_dt < UNHELD * self.longest
 
     def needs_friction(self, dt: float) -> bool:
         """Whether a step, s, is stable by dry friction alone, as far as small deviations go."""
@@ -99,19 +89,25 @@ class StepLimitRow(Row):
         return self.largest_push < runs.USUAL_PUSH
 
     @property
-    def longest(self) -> float:
-        """The longest stable step, s; inf: none fails. Runs have the last word."""
-        predicted = {"none": np.inf, "moving": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
-        if self.contradicted:
-            predicted = self.observed_dt or 0.0
-        return predicted if self.own_dt is None else min(predicted, self.own_dt)
+    def predicted(self) -> float:
+        """The longest stable step by the derivative, s; inf: none fails."""
+        return {"none": np.inf, "moving": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
 
     @property
     def decided_by_runs(self) -> bool:
-        """Whether runs say another limit than the derivative."""
-        if self.limit not in ("finite", "none", "moving"):
+        """Whether runs hold or fail elsewhere than at the limit of the derivative."""
+        if not self.is_known or self.observed_dt is self.failing_dt is None:
             return False
-        return not 0.95 <= min(self.longest, LONGEST) / (self.predicted_dt or LONGEST) <= 1.05
+        holds = (self.observed_dt or 0.0) >= 0.95 * min(self.predicted, LONGEST)
+        return not (holds and (self.failing_dt or np.inf) <= 1.05 * self.predicted)
+
+    @property
+    def longest(self) -> float:
+        """The longest stable step, s; inf: none fails. Runs have the last word."""
+        if self.decided_by_runs:
+            middle = float(np.sqrt((self.observed_dt or 0.0) * (self.failing_dt or 0.0)))
+            return np.inf if self.failing_dt is None else middle
+        return self.predicted
 
 
 def integrators_at_rest() -> list[str]:
@@ -146,18 +142,19 @@ class Asked(NamedTuple):
 
 def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> PlaceAnswer:
     """All that is asked of a posture as it stands, or in the air if that is another place: no rows if it is not."""
-    standing = standing_at(reading, posture)
-    place = standing if contacts else in_the_air_at(standing)
+    place: Place | None = standing_at(reading, posture)
+    if place and not contacts:  # its models take memory: it is not held longer
+        place = in_the_air_at(place)
     if place is None:
         return PlaceAnswer([], {}, [])
-    rows, curves = [], {}
+    rows, curves, changes = [], {}, []
     for integrator in asked.integrators:
         row, found = limit_row(place, integrator, asked)
         rows.append(row)
         if asked.drawn and row.is_known:
             curves[integrator] = curve(place, row, found)
-    fails = [row for row in rows if row.integrator == asked.integrator and row.stable_at_file_dt is False]
-    changes = cures(place.model, place.rest, asked.dt, asked.integrator) if fails and contacts else []
+        if contacts and integrator == asked.integrator and row.stable_at_file_dt is False:
+            changes = cures(runs_of(place, found, integrator, asked.dt), asked.dt)
     return PlaceAnswer(rows, curves, changes)
 
 
@@ -180,18 +177,16 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     """The limit of an integrator at a place, what the step in use does there, and the search for it."""
     model, dt = place.model, asked.dt
     found = limit(model, place.rest, integrator, dt)
-    shows = found.kind == "saddle" and found.growth.rate * LASTS > np.log(runs.CALM / runs.OWN_PUSH)
-    if shows and runs.stays_still(
-        model, place.rest, dt, integrator, place.creep
-    ):  # what grows there remains small
+    if found.kind == "saddle" and runs_of(place, found, integrator, dt).is_calm(runs.LIMIT_PUSHES[0], dt):
+        # friction or a stop holds, or what grows remains small
         found = limit(model, place.rest, integrator, dt, found.growth.rate)
     at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
     joint, contact = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
-        posture=place.posture.name, base="free" if has_free_base(model) else "fixed", surroundings=place.surroundings,
-        integrator=integrator, limit=found.kind.replace(" ", "_"), predicted_dt=found.dt, file_dt=dt,
-        file_integrator=asked.integrator, stable_at_file_dt=holds(found, dt), limiting_joint=joint,
-        limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,
+        posture=place.posture.name, base="free" if has_free_base(place.reading.model) else "fixed",
+        surroundings=place.surroundings, integrator=integrator, limit=found.kind.replace(" ", "_"),
+        predicted_dt=found.dt, file_dt=dt, file_integrator=asked.integrator,
+        limiting_joint=joint, limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,
         has_fallen=place.has_fallen, moved=float(moved.max()), moved_joint=place.speed_names[int(np.argmax(moved))],
         held_objects=place.held_objects,
     )  # fmt: skip
@@ -199,49 +194,48 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
         row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
     if at.rest.left <= SETTLED and not place.held_objects:
         row.apart = radius_apart(at.rest, place.tree)
-    if place.is_touching and found.kind != "saddle" and (found.kind == "no rest" or place.creep > MOVING):
+    moves = found.kind == "no rest" or (place.is_touching and place.creep > MOVING)
+    if moves and found.kind != "saddle" and not place.falls:
         row.limit, row.predicted_dt = "moving", None
-        add_motion(row, place)
-    elif row.is_known and (
-        place.contacts or integrator == asked.integrator
-    ):  # in the air the others have no use
-        if place.frictionless is not None:
-            row.smooth_dt = limit(place.frictionless, place.rest, integrator, dt).dt
-        if asked.in_runs:
+    is_asked = place.contacts or integrator == asked.integrator  # in the air the others have no use
+    if row.is_known and is_asked:
+        if asked.in_runs or row.limit == "moving":
             add_runs(row, place, found)
+        add_smooth_limit(row, place)
+    if row.is_known:
+        row.stable_at_file_dt = dt <= row.longest
     return row, found
+
+
+def runs_of(place: Place, found: Limit, integrator: str, longest: float) -> runs.Runs:
+    """Runs from the rest of a place. longest: s, a step that the derivative calls stable; fine ones are finer."""
+    fine = min(longest / 2.0, max(longest / runs.FINER, runs.FINEST))
+
+    def creep_at(dt: float) -> float:
+        return max(place.creep, found.creep_near(dt))
+
+    return runs.Runs(place.model, place.rest, integrator, fine, found.first.rest.is_held, creep_at)
 
 
 def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     """What runs show; they have the last word."""
-    if row.limit == "finite":
-        row.observed_dt, row.failing_dt = runs.observed(place.model, found, row.integrator)
-    add_own_limit(row, place, lambda dt: max(place.creep, found.creep_near(dt)))
-    row.largest_push, row.finer_push = runs.largest_push(place.model, found.first.rest, place.creep)
+    shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
+    if row.limit == "moving":
+        shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep_at=lambda dt: 0.0)
+        row.creep = shown.speed_after(runs.LIMIT_PUSHES[0], shown.fine, runs.lasting(shown.fine))
+        row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
+    row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)
+    if row.limit != "moving" and row.file_dt <= row.longest:
+        row.largest_push, row.finer_push = shown.largest_push(row.file_dt)
 
 
-def add_motion(row: StepLimitRow, place: Place) -> None:
-    """Of a robot that touches something and goes on moving: how fast at a finer step, and up to which step no faster."""
-    finer = Step(place.model, row.file_dt / runs.FINER, row.integrator, exact=False)
-    speed = runs.speed_at_end(finer, place.rest)
-    row.creep = speed if np.isfinite(speed) else place.creep
-    row.creeping_joint = place.speed_names[int(np.argmax(np.abs(finer.data.qvel)))]
-    creep = row.creep
-    add_own_limit(row, place, lambda dt: creep)
-
-
-def add_own_limit(row: StepLimitRow, place: Place, creep_at: Callable[[float], float]) -> None:
-    if longest := min(row.longest, LONGEST):
-        own = runs.own_limit(place.model, place.rest, row.integrator, longest, creep_at)
-        row.own_dt = own if own < longest else None
-    row.stable_at_file_dt = row.file_dt <= row.longest
-
-
-def holds(found: Limit, dt: float) -> bool | None:
-    """Whether a step is within a limit; None: there is none of the step alone."""
-    if found.kind in ("saddle", "no rest"):
-        return None
-    return found.kind == "none" or (found.dt is not None and dt <= found.dt)
+def add_smooth_limit(row: StepLimitRow, place: Place) -> None:
+    """The limit without dry friction, if that is lower."""
+    longest = min(row.longest, LONGEST)
+    if place.frictionless is None or not longest:
+        return
+    if not tried(place.frictionless, place.rest, UNHELD * longest, row.integrator).is_stable:
+        row.smooth_dt = limit(place.frictionless, place.rest, row.integrator, row.file_dt).dt
 
 
 def limiting(place: Place, rest: Rest, growth: Growth) -> tuple[str, str]:

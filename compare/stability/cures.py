@@ -1,16 +1,14 @@
 """Changes that make a step stable: of the file's gains, armature and contacts; each is tried in a run."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
 from ..engines.mujoco import variants
-from ..engines.mujoco.step import Step
-from .growth import grows
 from .limits import bisected, tried
-from .rest import rest_near
+from .runs import PUSHES, Runs
 
 SPARE = 1.01  # of the step: so far above it a change must hold
 WITHIN = 1.05  # fold: how closely the least change is found
@@ -41,27 +39,24 @@ CHANGES = (
 )
 
 
-def cures(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str) -> list[Cure]:
-    """The least change of each kind that makes a step stable, by its derivative and in a run."""
+def cures(shown: Runs, dt: float) -> list[Cure]:
+    """The least change of each kind that makes a step stable, by its derivative and in a run. shown: runs of the model."""
     return [
         Cure(change.name, factor)
         for change in CHANGES
-        if (factor := least_factor(change, model, state, dt, integrator)) is not None
+        if (factor := least_factor(change, shown, dt)) is not None
     ]
 
 
-def least_factor(
-    change: Change, model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str
-) -> float | None:
+def least_factor(change: Change, shown: Runs, dt: float) -> float | None:
     """The least strength of a change that holds; None: the model has nothing to change, or none holds."""
 
     def holds(factor: float) -> bool:
-        changed = change.made(model, factor)
-        return changed is not None and tried(changed, state, SPARE * dt, integrator).is_stable
+        changed = change.made(shown.model, factor)
+        return changed is not None and tried(changed, shown.state, SPARE * dt, shown.integrator).is_stable
 
     if not holds(change.most):
         return None
     high = bisected(lambda factor: not holds(factor), change.first, change.most, WITHIN)[1]
-    changed = change.made(model, high)
-    rest = None if changed is None else rest_near(Step(changed, dt, integrator), state)
-    return None if rest is None or grows(rest) else high
+    changed = change.made(shown.model, high)
+    return high if changed and replace(shown, model=changed).survives(PUSHES[-1], dt) else None

@@ -7,18 +7,16 @@ import mujoco
 import numpy as np
 from scipy.linalg import eig
 
-from ..engines.mujoco.step import NUDGE, Step
+from ..engines.mujoco.step import LITTLE, NUDGE, Step
 from ..robots.case import SEED
 from .rest import Rest
 
 OTHER_NUDGE = NUDGE / 3.0  # of the differences that show the noise
 NOISE_TIMES = 3.0  # fold, of the observed noise: what does not exceed it may be noise
 NOISE_LEAST = 1e-10  # of an entry of the derivative
-NEAR_ONE = 1e-3  # the distance from 1 of an eigenvalue that noise may have split from 1
 GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
 SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
-LASTS, LEAST_STEPS, MOST_STEPS = 4.0, 800, 20_000  # s: of a run, and between which numbers of steps
-LITTLE = 1e-6  # of an activation
+LASTS, MOST_STEPS = 4.0, 20_000  # s: of a run, and at most so many steps
 GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 
 
@@ -26,13 +24,12 @@ class Growth(NamedTuple):
     """The mode of a step that grows fastest, beyond noise.
 
     factor: by which it is multiplied in a step, 1.0: none grows. rate: its logarithm over dt, 1/s. shape: its movement, speeds
-    and activations, (n,) complex. is_uncertain: another one may grow, within noise.
+    and activations, (n,) complex.
     """
 
     factor: float
     rate: float
     shape: np.ndarray
-    is_uncertain: bool = False
 
 
 def growth(rest: Rest) -> Growth:
@@ -45,42 +42,22 @@ def growth(rest: Rest) -> Growth:
     still = Growth(1.0, 0.0, np.zeros(len(rest.A)))
     if not np.isfinite(rest.A).all():
         return Growth(np.inf, np.inf, still.shape)
+    if np.abs(np.linalg.eigvals(rest.A)).max(initial=0.0) <= 1.0 + GROWS * rest.step.dt:
+        return still
     values, left, right = eig(rest.A, left=True, right=True)
     excess = np.abs(values) - 1.0
-    if excess.max(initial=0.0) <= GROWS * rest.step.dt:
-        return still
     noise = rest.A - rest.step.derivative(rest.state, OTHER_NUDGE)
     overlap = np.maximum(np.abs((left.conj() * right).sum(axis=0)), 1e-300)
     uncertain = NOISE_TIMES * np.abs((left.conj() * (noise @ right)).sum(axis=0)) + NOISE_LEAST
-    is_noise = excess <= uncertain / overlap
-    apart_from_one = np.abs(values - 1.0) > NEAR_ONE
-    is_uncertain = bool((is_noise & apart_from_one & (excess > GROWS * rest.step.dt)).any())
-    excess[is_noise] = 0.0
+    excess[excess <= uncertain / overlap] = 0.0
     fastest = int(np.argmax(excess))
     factor = 1.0 + float(excess[fastest])
     if factor == 1.0:
-        return still._replace(is_uncertain=is_uncertain)
-    return Growth(factor, float(np.log(factor)) / rest.step.dt, right[:, fastest], is_uncertain)
+        return still
+    return Growth(factor, float(np.log(factor)) / rest.step.dt, right[:, fastest])
 
 
 # runs
-
-
-def grows(rest: Rest, rate: float = 0.0) -> bool:
-    """Whether a small push from a rest grows in a run.
-
-    rate: of the growth that is expected, 1/s; the run lasts until it would show.
-    """
-    if not rest.is_found:
-        return True
-    lasts = max(LASTS, np.log(GROWN) / rate if rate > 0.0 else 0.0)
-    steps = steps_in(lasts, rest.step.dt)
-    plain = speeds_of(rest.step.run(rest.state, steps))
-    return has_grown(apart(rest.step.run(pushed(rest, SMALL_PUSH), steps), plain), steps)
-
-
-def steps_in(lasts: float, dt: float) -> int:
-    return int(np.clip(lasts / dt, LEAST_STEPS, MOST_STEPS))
 
 
 def pushed(rest: Rest, push: float) -> np.ndarray:

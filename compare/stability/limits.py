@@ -7,10 +7,10 @@ import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .growth import GROWS, Growth, grows, growth
+from .growth import GROWS, Growth, growth
 from .rest import Rest, rest_near
 
-LONGEST, SHORTEST = 0.4, 1e-6  # s: steps that are tried
+LONGEST, SHORTEST = 0.2, 1e-6  # s: steps that are tried
 COARSER = 1.5  # fold, from one tried step to the next
 REFINED = 2e-3  # of a limit
 SLOW = 1.2  # a factor below: of what grows little in a step
@@ -29,12 +29,11 @@ class Tried:
     growth: Growth
     drift: float
     moved: float  # rad or m, of the rest from the state from which it was sought
-    run_grows: bool  # where the derivative is uncertain: whether a small push grows in a run
 
     @property
     def is_stable(self) -> bool:
         stays = self.rest.is_found and self.moved <= GIVES_WAY
-        return stays and not self.run_grows and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
+        return stays and self.growth.rate <= max(GROWS, BESIDE_DRIFT * self.drift)
 
 
 @dataclass(frozen=True)
@@ -57,26 +56,17 @@ class Limit:
     def first(self) -> Tried:
         return self.tries[0]
 
-    def state_below(self, dt: float) -> np.ndarray:
-        """The rest of the search nearest below a step, s: from there the one at the step is followed."""
-        below = self.stable_below(dt)
-        return max(below, key=lambda at: at.dt).rest.state if below else self.rest.state
-
     def creep_near(self, dt: float) -> float:
         """The largest speed at the rests of the search up to a step, s, and the next coarser one."""
-        speeds = [np.abs(at.rest.speeds).max(initial=0.0) for at in self.stable_below(COARSER * dt)]
-        return float(max(speeds, default=0.0))
-
-    def stable_below(self, dt: float) -> list[Tried]:
-        return [at for at in self.tries if at.is_stable and at.dt <= dt]
+        near = [at.rest for at in self.tries if at.is_stable and at.dt <= COARSER * dt]
+        return float(max((np.abs(rest.speeds).max(initial=0.0) for rest in near), default=0.0))
 
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
     """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""
     rest = rest_near(Step(model, dt, integrator), state)
     moved = float(np.abs(distance(model, state, rest.state)).max(initial=0.0))
-    found = growth(rest)
-    return Tried(dt, rest, found, drift, moved, found.is_uncertain and grows(rest))
+    return Tried(dt, rest, growth(rest), drift, moved)
 
 
 def limit(

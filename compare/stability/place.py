@@ -17,7 +17,7 @@ from ..engines.mujoco.variants import add_armature, has_free_base, in_the_air, o
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
 from .limits import is_saddle, tried
-from .rest import NEAR_REST, fastest, left_at, relaxed, rest_near
+from .rest import NEAR_REST, left_at, relaxed, rest_near
 
 MOST_POSTURES = 6  # the first keyframes
 FINE = 4  # fold: steps of the file's own, and finer, at which a saddle is known
@@ -107,9 +107,21 @@ class Place:
         return left_at(Step(self.model, self.model.opt.timestep, self.reading.integrator), self.rest)
 
     @cached_property
+    def speeds(self) -> np.ndarray:
+        """At the rest, (nv,) rad/s or m/s."""
+        step = Step(self.model, self.model.opt.timestep, self.reading.integrator)
+        step.put(self.rest)
+        return step.data.qvel.copy()
+
+    @property
     def creep(self) -> float:
         """The largest speed at the rest, rad/s or m/s."""
-        return fastest(Step(self.model, self.model.opt.timestep, self.reading.integrator), self.rest)
+        return float(np.abs(self.speeds).max(initial=0.0))
+
+    @property
+    def falls(self) -> bool:
+        """Whether nothing stops the fall of a free base."""
+        return has_free_base(self.model) and not self.is_touching and self.left > FALLS
 
     @property
     def has_fallen(self) -> bool:
@@ -197,7 +209,6 @@ def standing_at(reading: Reading, posture: Posture) -> Place:
 
 def in_the_air_at(standing: Place) -> Place | None:
     """The same posture in the air; None: nothing touches it, and it rests."""
-    has_fallen = has_free_base(standing.reading.model) and standing.left > FALLS
-    if not standing.is_touching and not has_fallen:
+    if not standing.is_touching and not standing.falls:
         return None
     return placed(standing.reading, standing.posture, contacts=False)

@@ -25,7 +25,7 @@ DEPENDENT = 1e-4, 1e-6, 1e-9
 RELAXED_STEPS = 1e-3, 5e-4  # s, the longest step of a relaxed run, and of a file with a shorter one
 RELAXED = (4.0, 10.0), (3.0, 1.0), (2.0, 0.0)  # s, 1/s: how long its parts last, how fast its speeds decay
 RELAXED_STILL = 1e-6  # rad/s or m/s
-WILD = 100.0  # rad/s or m/s: a relaxed run that is faster has diverged
+WILD = 100.0  # rad/s or m/s: a run that is faster has diverged
 LEFT_ALONE, MOST_ALONE = 1.0, 4000  # s, and steps at most, of a run that is left alone
 HALVED_STEPS = 500  # of a run whose speeds are halved after each step
 

@@ -1,27 +1,28 @@
-"""What runs show: where small deviations from rest grow, the file's own run, and the largest push that is survived."""
+"""What the file's own runs show: up to which step the robot stays at rest, and the largest push that it survives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .growth import GROWN, LASTS, SMALL_PUSH, apart, grows, push_of, pushed, speeds_of, steps_in
-from .limits import COARSER, LONGEST, SHORTEST, Limit, bisected
-from .rest import Rest, rest_near
+from .growth import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, push_of, pushed, speeds_of
+from .limits import COARSER, LONGEST, SHORTEST, bisected
+from .rest import WILD, Rest
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
-WITHIN = 1.07  # fold: how near they are then
-OWN_FOLDS = 1.125, 1.03  # from one step of a file's own run to the next, one after the other
-OWN_PUSH = 1e-6  # rad/s or m/s: at the start of a file's own run
+WITHIN = 1.065  # fold: how near they are where they differ elsewhere
 CURVE_STEPS, LEAST_SIZES = 400, 16  # of a run that shows how fast a push grows, and while it is small
+LIMIT_PUSHES = 1e-3, 1e-6  # rad/s or m/s: at the start of runs that show a limit
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest
 FAR = 0.5  # rad or m: from a rest to what is another one
-AS_FAST, AS_FAST_ALONE, WILD = 2.0, 4.0, 1e3  # fold: of the creep, after a push and without; more has failed
+AS_CREEP, AS_FAST = 4.0, 2.0  # fold: of the creep, and of a run of fine steps
 THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
-FINER = 8  # the step over the one that shows whether the robot itself bears a push
+FINER, FINEST = 8, 2e-4  # fold, and s: of the steps that show what the robot does by itself
 
 
 def growth_in_run(rest: Rest) -> float | None:
@@ -34,105 +35,106 @@ def growth_in_run(rest: Rest) -> float | None:
     return float(np.exp(np.polyfit(np.arange(first, len(sizes)), np.log(sizes[first:]), 1)[0]))
 
 
-def speed_after(model: mujoco.MjModel, rest: Rest, push: float, dt: float) -> float:
-    """The largest speed, beside the creep, in the last eighth of a run after a push, by the file's own solver.
-
-    inf: the run fails, or ends elsewhere, as that of a robot which falls over and lies still.
-    """
-    step = Step(model, dt, rest.step.integrator, exact=False)
-    steps = steps_in(LASTS, dt)
-    speeds = speeds_of(step.run(pushed(rest, push), steps))
-    moved = distance(model, rest.state, step.state())[rest.is_held]
-    if len(speeds) < steps or np.abs(moved).max(initial=0.0) > FAR:
-        return np.inf
-    return float(np.abs(speeds[-steps // 8 :] - rest.speeds).max())
+def lasting(dt: float) -> float:
+    """How long a run lasts, s."""
+    return min(LASTS, MOST_STEPS * dt)
 
 
-def largest_push(model: mujoco.MjModel, rest: Rest, creep: float) -> tuple[float, bool | None]:
-    """The largest push that is survived, rad/s or m/s, 0.0: none; and whether a finer step survives no larger one either.
-
-    The robot calms down near its rest, or moves on no faster than at a finer step, as what nothing brakes, or little, does;
-    that is not asked after a push larger than usual, nor what a finer step survives beyond a usual one.
-    creep: of the robot, rad/s or m/s.
-    """
-    dt = rest.step.dt
-
-    def is_survived(push: float) -> bool:
-        speed = speed_after(model, rest, push, dt)
-        is_calm = speed <= max(CALM, CALMER * push, AS_FAST * creep)
-        if is_calm or push > USUAL_PUSH or not np.isfinite(speed):
-            return is_calm
-        return speed <= AS_FAST * speed_after(model, rest, push, dt / FINER)
-
-    survived = next((push for push in PUSHES if is_survived(push)), 0.0)
-    if survived >= USUAL_PUSH:
-        return survived, None
-    finer = rest_near(Step(model, dt / FINER, rest.step.integrator), rest.state)
-    next_larger = min(push for push in PUSHES if push > survived)
-    return survived, speed_after(model, finer, next_larger, dt / FINER) > THROWN * next_larger
+def upwards(first: float, predicted: float) -> Iterator[float]:
+    """Steps above the first, s: those to either side of a predicted limit, the longest, and others between them."""
+    for mark in (BELOW * predicted, ABOVE * predicted, LONGEST):
+        if first < mark <= LONGEST:
+            while first * COARSER < mark:
+                first *= COARSER
+                yield first
+            first = mark
+            yield mark
 
 
-def own_limit(
-    model: mujoco.MjModel,
-    state: np.ndarray,
-    integrator: str,
-    longest: float,
-    creep_at: Callable[[float], float],
-) -> float:
-    """The longest step up to `longest`, s, at which the file's own run from a state stays still, or as slow as its creep.
+@dataclass(frozen=True)
+class Runs:
+    """Runs of a file, by its own solver, from where it rests.
 
-    creep_at: at a step, s. By the file's own solver, without searching a rest for each step; within 3 %. 0.0: at none.
+    fine: a step at which the robot shows what it does by itself, s. is_held: at which positions forces depend on the movement,
+    (nv,). creep_at: the largest speed at rest at a step.
     """
 
-    def holds(step: float) -> bool:
-        return stays_still(model, state, step, integrator, creep_at(step))
+    model: mujoco.MjModel
+    state: np.ndarray
+    integrator: str
+    fine: float
+    is_held: np.ndarray
+    creep_at: Callable[[float], float]
 
-    low = high = longest
-    while not holds(low):
-        low, high = low / COARSER, low
-        if low < SHORTEST:
-            return 0.0
-    for fold in OWN_FOLDS:  # upwards: a longer one may hold beyond a gap
-        while low * fold < high and holds(low * fold):
-            low *= fold
-    return low
+    @cached_property
+    def speed_after(self) -> Callable[[float, float, float], float]:
+        return lru_cache(self.run)
 
+    def run(self, push: float, dt: float, lasts: float) -> float:
+        """The largest speed in the last eighth of a run after a push of all speeds; inf: it fails, or ends elsewhere.
 
-def stays_still(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, creep: float) -> bool:
-    """Whether the file's own run from where it sank to stays there, still."""
-    step = Step(model, dt, integrator, exact=False)
-    speed = speed_at_end(step, state, WILD * max(CALM, creep))
-    moved = float(np.abs(distance(model, state, step.state())).max(initial=0.0))
-    return speed <= max(CALM, AS_FAST_ALONE * creep) and moved <= FAR + creep * dt * steps_in(LASTS, dt)
+        Elsewhere is also where a robot lies still that has fallen over.
+        """
+        step = Step(self.model, dt, self.integrator, exact=False)
+        count, last = round(lasts / dt), 0.0
+        start = step.moved(self.state, push_of(step, self.state, push))
+        number = 0
+        for number, data in enumerate(step.run(start, count), 1):
+            speed = float(np.abs(data.qvel).max(initial=0.0))
+            if not speed < WILD:
+                return np.inf
+            last = max(last, speed) if 8 * number > 7 * count else 0.0
+        moved = np.abs(distance(self.model, self.state, step.state()))[self.is_held].max(initial=0.0)
+        is_there = number == count and moved <= FAR + self.creep_at(dt) * lasts
+        return last if is_there else np.inf
 
+    def is_calm(self, push: float, dt: float) -> bool:
+        """Whether the robot calms down after a push."""
+        allowed = max(CALM, CALMER * push, AS_CREEP * self.creep_at(dt))
+        return self.speed_after(push, dt, lasting(dt)) <= allowed
 
-def speed_at_end(step: Step, state: np.ndarray, most: float = np.inf) -> float:
-    """The largest speed in the last eighth of a run from a state after a small push; inf: it fails, or exceeds `most`."""
-    steps, speeds = steps_in(LASTS, step.dt), []
-    for data in step.run(step.moved(state, push_of(step, state, OWN_PUSH)), steps):
-        speeds.append(float(np.abs(data.qvel).max()))
-        if not speeds[-1] <= most:
-            return np.inf
-    return max(speeds[-steps // 8 :]) if len(speeds) == steps else np.inf
+    def survives(self, push: float, dt: float) -> bool:
+        """Whether the robot calms down after a push, or moves on no faster than in a run of fine steps.
 
+        So does what nothing brakes. That is not asked after a push larger than usual.
+        """
+        speed = self.speed_after(push, dt, lasting(dt))
+        if self.is_calm(push, dt) or push > USUAL_PUSH or not np.isfinite(speed):
+            return self.is_calm(push, dt)
+        return speed <= AS_FAST * self.speed_after(push, self.fine, lasting(dt))
 
-def observed(model: mujoco.MjModel, limit: Limit, integrator: str) -> tuple[float | None, float | None]:
-    """The longest step at which runs hold and the shortest at which they fail, s, 3 % to either side of a limit.
+    def hold(self, dt: float) -> bool:
+        """Whether the robot stays at rest after small pushes, or leaves it in runs of fine steps, too, as a drone does."""
+        return all(
+            self.survives(push, dt) or self.speed_after(push, self.fine, lasting(dt)) == np.inf
+            for push in LIMIT_PUSHES
+        )
 
-    Where they do not differ there, from the limit up or down to where they do. None: none that holds, or that fails.
-    """
-    assert limit.dt is not None
+    def limit(self, dt: float, predicted: float) -> tuple[float | None, float | None]:
+        """The longest step at which runs hold and the shortest at which they fail, s.
 
-    def fails(dt: float) -> bool:
-        return grows(rest_near(Step(model, dt, integrator), limit.state_below(dt)), limit.growth.rate)
+        They are sought upwards from a step in use, dt, to the first that fails, downwards where that fails itself: 3 % to either
+        side of a predicted limit if runs agree with it. None: none that holds, or that fails.
+        """
+        low, high = min(dt, BELOW * predicted), None
+        while not self.hold(low):
+            low, high = low / COARSER, low
+            if low < SHORTEST:
+                return None, high
+        for longer in upwards(low, predicted) if high is None else ():
+            if not self.hold(longer):
+                high = longer
+                break
+            low = longer
+        return bisected(self.hold, low, high, WITHIN) if high else (low, None)
 
-    low, high = BELOW * limit.dt, ABOVE * limit.dt
-    while fails(low):
-        low, high = low / COARSER, low
-        if low < SHORTEST:
-            return None, high
-    while not fails(high):
-        low, high = high, high * COARSER
-        if high > LONGEST:
-            return low, None
-    return bisected(lambda dt: not fails(dt), low, high, WITHIN)
+    def largest_push(self, dt: float) -> tuple[float, bool | None]:
+        """The largest push that is survived at a step, rad/s or m/s, 0.0: none; and whether fine steps bear no larger one.
+
+        What fine steps bear is not asked beyond a usual push.
+        """
+        survived = next((push for push in PUSHES if self.survives(push, dt)), 0.0)
+        if survived >= USUAL_PUSH:
+            return survived, None
+        larger = min(push for push in PUSHES if push > survived)
+        return survived, self.speed_after(larger, self.fine, lasting(dt)) > THROWN * larger

@@ -86,11 +86,3 @@ def exact_mass_matrix(tree: tmt.Tree, q: tuple[mpmath.mpf, ...]) -> list[list[mp
     """Mbar at a position in mpmath's current digits; cached, as the scenes of a robot share positions."""
     exact = exact_tree(tree, mpmath.mpf)
     return method.mass_matrix(method.bodies(exact, q), exact.armature)
-
-
-def reduced(case: Case, need: Needed | None = None) -> Case | None:
-    """The same case with the joints locked that stay; None if it needs all of them, or none."""
-    stays = (need or needed(case)).stays
-    if not stays or len(stays) == len(case.joints):
-        return None
-    return case.changed(name=f"{case.name}, {' and '.join(stays)} locked", locked=case.scene.locked + stays)

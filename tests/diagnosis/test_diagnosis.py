@@ -70,6 +70,13 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
     "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "gravity of h[beta] in h[alpha]", -1.0, False),
     "damping D qd in h": (added(slice(6, None), QD * DAMPED.damping), 1, "damping D qd", "in h", True),
     "-D qd in h": (added(slice(6, None), -QD * DAMPED.damping), 1, "damping D qd", "in h, of the other sign", True),
+    "off-diagonal entries halved": (
+        added([1, 3, 4], 0.0, 0.5), 1, "entries of M off the diagonal", "halved", True),
+    "rows of h exchanged": (
+        values()[:, [0, 1, 2, 3, 4, 5, 6, 8, 7]], 2, "h[beta] and h[gamma]", "exchanged", True),
+    "another variable": (values(ARM, Q[:, [0, 1, 1]], QD), 2, "q of beta taken for that of gamma", "", True),
+    "another rate": (
+        packed(tmt.mass_matrix(Q), tmt.bias(Q, QD[:, [0, 0, 2]])), 2, "qd of alpha taken for that of beta", "", True),
     "no bias": (added(slice(6, None), 0.0, 0.0), 1, "bias", "left out", False),
     "an armature": (added(5, 0.1), 2, "armature of gamma", 0.1, False),
     "two numbers": (
@@ -170,6 +177,8 @@ def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(add
 @pytest.mark.parametrize("added, place, explains", [
     ({M10: 0.5 * np.sin(KNEE) - 0.5 * np.cos(KNEE)}, "M[hip][knee]", "0.5 sin(knee) instead of 0.5 cos(knee)"),
     ({M11: 0.35 * np.cos(HIP) - 0.35}, "M[knee][knee]", "0.35 cos(hip) instead of 0.35"),
+    ({M00: 0.3 * (np.sin(HIP) - np.cos(HIP)) * np.cos(KNEE) ** 2}, "M[hip][hip]",
+     "0.3 sin(hip) cos(knee)^2 instead of 0.3 cos(hip) cos(knee)^2"),
     ({H1: 0.3 * np.sin(HIP)}, "h[knee], gravity", "0.3 sin(hip) added"),
     ({M10: np.cos(KNEE) * (np.cos(KNEE) - 1.0) / 2.0}, "M[hip][knee]", "0.5 cos(knee)^2 instead of 0.5 cos(knee)"),
     (EXCHANGED, "sine and cosine of knee exchanged in gravity", ""),
@@ -183,6 +192,13 @@ def test_another_function_of_an_angle_is_named_with_its_coefficient(added, place
 def test_the_nearest_cause_is_told_if_it_leaves_less_than_half(size, is_near):
     closest = told({M00: 0.4 + size * np.sin(3.0 * KNEE)}).closest
     assert closest.left_over < 0.5 if is_near else closest is None
+
+
+def test_the_matrix_of_velocity_terms_transposed_is_the_gradient_of_the_kinetic_energy():
+    """Of Christoffel's C and a constant M but for cos(knee): C' qd has one entry, - sin(knee) (hip'^2 + hip' knee') / 2."""
+    moving = lambda q, qd: -np.sin(q[:, 1:]) * (qd[:, :1] ** 2 + qd[:, :1] * qd[:, 1:]) / 2.0 * [0, 1]  # noqa: E731
+    causes = told({}, lambda q, qd: tmt.gravity_balance(q, TREE) + moving(q, qd)).causes
+    assert (causes[0].place, causes[0].explains) == ("C(q, qd) in h", "transposed, C' qd for C qd")
 
 
 def test_an_added_product_of_speeds_is_named():
@@ -237,6 +253,14 @@ def test_two_numbers_that_differ_are_not_printed_as_one():
     for pair in ((3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)):
         texts = apart(*pair), apart(*pair[::-1])
         assert texts[0] != texts[1] and [float(text) for text in texts] == pytest.approx(pair, rel=1e-5)
+
+
+@pytest.mark.parametrize("change, read, meant", [
+    (90.0 - np.pi / 2.0 - 28.0 * np.pi, 90.0, np.pi / 2.0), (1.5707963 * (np.pi / 180.0 - 1.0), np.pi**2 / 360.0, np.pi / 2.0),
+])  # fmt: skip
+def test_a_zero_that_is_read_in_another_unit_is_its_angle(change, read, meant):
+    cause = Place(OF_ZERO, "zero of knee", 0.0, "rad", 1.0).cause(change)
+    assert (cause.kind, cause.explains, cause.stated) == ("number", pytest.approx(read), pytest.approx(meant))
 
 
 @pytest.mark.parametrize("unit, explains", [("rad", 0.5 - np.pi / 2), ("m", 0.5 + 1.5 * np.pi)])

@@ -13,7 +13,7 @@ from compare.diagnosis.groups import is_round
 from compare.diagnosis.likelihood import NATURAL, cost
 from compare.diagnosis.model import Equations, Layout
 from compare.diagnosis.recursion import SLIPS, Recursion, slips_of_recursion
-from compare.engines.mujoco import reading
+from compare.engines.mujoco import reading, tree_with_sites
 from compare.robots.coordinates import Coordinates
 from compare.robots.joint_map import joint_map
 
@@ -120,6 +120,39 @@ def test_a_convention_and_a_number_are_named_together():
     assert found.causes[0].place == "angle of gamma and mass of second"
 
 
+BENT = """<mujoco><worldbody>
+  <body name="arm" euler="-90 0 30"><joint name="lift" axis="0 0 1"/>
+    <inertial pos=".1 .02 .01" mass="2" fullinertia=".006 .021 .022 .001 .0007 .0004"/>
+    <body name="hand" pos=".3 .02 .01" euler="20 0 45"><joint name="elbow" axis="0 0 1"/>
+      <inertial pos=".09 .01 .03" mass=".8" fullinertia=".0009 .0031 .0033 .0001 .00005 .00002"/></body></body>
+</worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("text, other, place, explains", [
+    ("pos=\".09 .01 .03\"", "pos=\".09 .01 .3\"", "CoM z of hand", 0.3),
+    ("pos=\".3 .02 .01\"", "pos=\".3 .2 .01\"", "offset y of elbow", 0.2),
+    (".0009 .0031 .0033", ".0033 .0031 .0009", "moments of inertia of hand, axes x and z exchanged", ""),
+    ("elbow\" axis=\"0 0 1\"", "elbow\" axis=\"0 1 0\"", "axis of elbow", "y"),
+    ("euler=\"20 0 45\"", "", "fixed turn at elbow (euler, quat or rpy)", "left out"),
+    ("<worldbody>", "<compiler eulerseq=\"XYZ\"/><worldbody>", "fixed turn at every joint (euler, quat or rpy)",
+     "angles in the other order, z, y, x"),
+])  # fmt: skip
+def test_numbers_are_said_in_the_frames_of_the_file(text, other, place, explains):
+    right, wrong = tree_with_sites(reading.read(BENT)), reading.read(BENT.replace(text, other)).tree
+    found = first(of_parts(right, *parts(wrong)))
+    assert found == (place, pytest.approx(explains) if isinstance(explains, float) else explains)
+
+
+def test_a_tensor_about_other_axes_is_named_with_its_turn():
+    straight = reading.read(
+        BENT.replace('euler="20 0 45"', 'euler="90 0 0"').replace('euler="-90 0 30"', 'euler="-90 0 0"')
+    ).tree
+    about_x = np.array([[1.0, 0.0, 0.0], [0.0, np.sqrt(0.75), -0.5], [0.0, 0.5, np.sqrt(0.75)]])
+    tensors = [*straight.inertia[:1], about_x @ np.array(straight.inertia[1]) @ about_x.T]
+    found = of_parts(straight, *parts(replace(straight, inertia=np.array(tensors).tolist())))
+    assert first(found) == ("inertia of hand", "turned by rpy = (30, 0, 0) deg")
+
+
 TENSOR = np.array(ARM.inertia[1])
 EDITS = {  # numbers of the arm: the cause
     "axes exchanged": ({"inertia": (ARM.inertia[0], TENSOR[::-1, ::-1])}, "inertia of forearm, axes x and z exchanged"),
@@ -127,6 +160,9 @@ EDITS = {  # numbers of the arm: the cause
     "of rods": ({"inertia": np.array(ARM.inertia) * [[1], [1], [0]]}, "inertia zz of every body"),
     "in mm": ({"com": 1e3 * np.array(ARM.com), "offset": 1e3 * np.array(ARM.offset)}, "all lengths"),
     "along x": ({"gravity": (-9.81, 0.0, 0.0)}, "gravity"),
+    "a length and a CoM": (
+        {"com": ((0.0, 0.0, -0.3), ARM.com[1]), "offset": (*ARM.offset[:2], (0.0, 0.0, -0.15))},
+        "CoM of upper arm and offset of gamma"),
     "another axis": ({"axis": (*ARM.axis[:2], (0.0, 0.0, 1.0))}, "axis of gamma"),
 }  # fmt: skip
 

@@ -1,5 +1,6 @@
 """Small MJCF, a case of any tree, and the comparison of both engines: for engines/test_mujoco_*.py."""
 
+import struct
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +19,12 @@ TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k"
 URDF = """<robot name="r"><link name="base"/><link name="b"><inertial><origin xyz="0.1 0 0.2" rpy="0.4 -0.3 0.9"/>
 <mass value="1"/><inertia ixx="0.04" ixy="0.003" ixz="0" iyy="0.025" iyz="-0.002" izz="0.02"/></inertial></link>
 <joint name="j" type="continuous"><parent link="base"/><child link="b"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+CORNERS = np.eye(4, 3, k=-1)  # of a tetrahedron
+FACES = (0, 2, 1), (0, 3, 2), (0, 1, 3), (1, 2, 3)
+TETRAHEDRON = [struct.pack("<12fH", 0, 0, 0, *CORNERS[list(face)].ravel(), 0) for face in FACES]
+STL = struct.pack("<80sI", b"", len(FACES)) + b"".join(TETRAHEDRON)
 
 
 def mjcf(content: str = PLAIN, before: str = "", after: str = "") -> str:

@@ -1,6 +1,5 @@
 """Engines that read the robot's file: each installed one against closed forms and exact values, and seeded errors."""
 
-import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 import tmt
 from compare.engines import RECORDS, Setting
 from compare.engines.outside import Outside
-from compare.engines.outside.model import FROM_URDF, EngineError
+from compare.engines.outside.file import EngineError
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.states import Sample
@@ -18,7 +17,10 @@ from compare.run.reference import compared_with
 ROOT = Path(__file__).parents[2]
 ENGINES = [name for name, record in RECORDS.items() if record.reads_file and not Outside(name).unavailable()]
 pytestmark = pytest.mark.parametrize("engine", ENGINES)
-ROBOTS = [ROOT / name for name in ("mjcf/arm.xml", "tests/models/arm7.xml", "tests/models/quadruped.xml")]
+ROBOTS = [
+    ROOT / "mjcf/arm.xml",
+    *(ROOT / f"tests/models/{name}.xml" for name in ("arm7", "quadruped", "pendulum_ball")),
+]
 BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
 PENDULUM = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" damping="0.1"/>
 {BODY.format("0 0 -0.5", 2, "0.25 0.2 0.1")}</body></worldbody></mujoco>"""
@@ -51,12 +53,15 @@ def test_a_pendulum(engine, tmp_path):
     assert near(of.acceleration(q, v, tau), (0.25 - 0.1 * 1.5 - moment) / inertia, engine, 100.0)
 
 
-def test_derivatives_are_those_of_the_equations(engine):
-    """Of the arm's seven joints, by movements, speeds and torques, with damping and springs."""
-    of, robot = dynamics(engine, ROBOTS[1])
+def test_derivatives_are_those_of_the_equations(engine, tmp_path):
+    """Of two joints, which compile soon, by movements, speeds and torques, with damping and a spring."""
+    text = TWO_LINKS.replace('name="hip"', 'name="hip" damping="0.3"').replace(
+        'name="knee"', 'name="knee" stiffness="2"'
+    )
+    of, robot = dynamics(engine, text, tmp_path)
     if not of.has("derivatives"):
         pytest.skip("it has no derivatives of this robot")
-    q, v, tau = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 2, 7))
+    q, v, tau = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 2, 2))
     expected = np.stack(tmt.derivatives(q, v, tau, robot.tree)[:3], axis=1)
     assert near(of.derivatives(q, v, tau), expected, engine, 1e3 * np.abs(expected).max())
 
@@ -111,25 +116,6 @@ def test_a_robot_against_the_exact_values(engine, robot):
     exact = sample.exact("acceleration")
     size = scales.acceleration(scales.force(tau), exact.high)
     assert (exact.distance(of.acceleration(q, v, tau)) <= bound * size).all()
-
-
-@pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature", "damping"))
-def test_a_number_that_differs_is_named(engine, number, tmp_path):
-    """A wrong number of the Tree is found in what the engine has read, where it tells; a mended one is set."""
-    of, robot = dynamics(engine, TWO_LINKS, tmp_path)
-    tree = robot.tree
-    inertia = [np.array(tensor) * (1.0 + 0.01 * k) for k, tensor in enumerate(tree.inertia)]
-    wrong = {
-        "mass": {"mass": [1.0, 1.01]}, "moments": {"inertia": inertia},
-        "gravity": {"gravity": (1.0, 2.0, 9.81)}, "armature": {"armature": [0.01, 0.02]}, "damping": {"damping": [0.0, 0.3]},
-    }[number]  # fmt: skip
-    of.tree = dataclasses.replace(tree, **wrong)
-    if number in of.reading["read"]:
-        is_of_urdf = of.reading["way"] == FROM_URDF and number in of.reading["unwritten"]
-        assert number in of.reading["mended"] or is_of_urdf
-    M = of.mass_matrix(np.array([[0.4, -0.9]]))[0]
-    if of.reading["mended"].get(number) and number == "armature":
-        assert near(M[1, 1], 0.37, engine)
 
 
 @pytest.mark.parametrize("damping", ["0", "0.4"])

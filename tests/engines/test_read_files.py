@@ -1,11 +1,11 @@
 """Files for engines that read them: URDF, includes and names; the URDF text of a compiled model; what acts in Drake's runs."""
 
-import struct
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+from files import STL
 from models import PATHS, random_tree
 
 import tmt
@@ -33,10 +33,10 @@ PART = """<mujocoinclude><body name="arm"><joint name="hip" axis="0 1 0" damping
 WHOLE = """<mujoco><worldbody><include file="part.xml"/></worldbody><keyframe><key qpos="1 2"/></keyframe></mujoco>"""
 FREE = """<mujoco><worldbody><body name="top"><freejoint name="base"/>
 <inertial pos="0.1 0 0.2" mass="2" diaginertia="0.3 0.2 0.15"/></body></worldbody></mujoco>"""
-FACES = (0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)  # of a tetrahedron
-STL = [struct.pack("<12fH", 0, 0, 0, *np.eye(4, 3)[list(face)].ravel(), 0) for face in FACES]
-MESHES = """<mujoco><compiler meshdir="parts"/><asset><mesh name="m" file="m.stl"/></asset><worldbody>
-<geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom type="mesh" mesh="m"/><body pos="0 0 1">
+MESHES = """<mujoco><compiler meshdir="parts"/>
+<default><default class="drawn"><geom type="mesh" mesh="m"/></default></default>
+<asset><mesh name="m" file="m.stl"/></asset><worldbody>
+<geom type="mesh" mesh="m"/><body><joint name="j" axis="0 1 0"/><geom class="drawn"/><geom size="0.1" mass="0"/><body pos="0 0 1">
 <joint axis="1 0 0"/><inertial pos="0 0 0.5" mass="2" diaginertia="0.3 0.2 0.15"/><geom type="mesh" mesh="m"/>
 </body></body></worldbody></mujoco>"""
 ARM = Path(__file__).parents[2] / "mjcf" / "arm.xml"
@@ -66,10 +66,10 @@ def robot_of(path, text, floating=False):
     ("crane.urdf", URDF), ("floating.urdf", URDF), ("robot.xml", WHOLE), ("meshes.xml", MESHES),
 ))  # fmt: skip
 def test_a_urdf_and_files_with_an_include_and_with_meshes(engine, name, text, tmp_path):
-    """A body whose mass is a mesh's has the inertia that MuJoCo has computed."""
+    """A body whose mass is a mesh's, by its class, has the inertia that MuJoCo has computed."""
     (tmp_path / "part.xml").write_text(PART)
     (tmp_path / "parts").mkdir()
-    (tmp_path / "parts" / "m.stl").write_bytes(struct.pack("<80sI", b"", 4) + b"".join(STL))
+    (tmp_path / "parts" / "m.stl").write_bytes(STL)
     robot = robot_of(tmp_path / name, text, floating=name == "floating.urdf")
     of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
     q = robot.coordinates.random(rng, 3)
@@ -131,7 +131,6 @@ def test_what_mujoco_reads_back_has_the_same_values(source, rng, states=5):
         assert (error <= FACTOR * EPS * scales.bias[state]).all()
 
 
-@pytest.mark.parametrize("name, why", [("quadruped", "root' is .* free"), ("pendulum_ball", "r' is .* ball")])
-def test_what_a_urdf_cannot_say_is_refused(name, why):
-    with pytest.raises(ValueError, match=why):
-        urdf(read(PATHS[name]).model)
+def test_what_a_urdf_cannot_say_is_refused():
+    with pytest.raises(ValueError, match="r' is of type ball"):
+        urdf(read(PATHS["pendulum_ball"]).model)

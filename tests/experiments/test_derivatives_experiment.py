@@ -41,7 +41,8 @@ def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_deriva
     assert 1e-10 < values["inverse"].error < 1e-5 and values["exact"].error < 1e-12
     values = {**values, "centred": dataclasses.replace(centred, eps=1e-5, unit="m per N", largest=3.0)}
     said = say(Finding("derivatives", "advice", values))
-    assert "use eps 1e-05, centred" in said and "m per N, of 3)" in said
+    assert "differences: use eps 1e-05, centred" in said and "m per N, of 3)" in said
+    assert "contacts left out: use" in say(Finding("derivatives", "advice", values | {"in_air": True}))
 
 
 def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
@@ -90,8 +91,8 @@ def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relat
     assert (ways.sizes(exact, forces) == np.abs(exact)).all()  # of the inverse dynamics: of the same unit
     off = np.full((2, 3), 1e-9)
     assert ways.relative(off, exact, forces)[:2] == (pytest.approx(1e-3), "N per N")
-    # rounding may have made the others
-    assert ways.relative(off, exact, forces, least=0.5) == (1e-9, "N per m", 1.0)
+    rounded = ways.relative(off, exact, forces, least=0.5)  # rounding may have made the others
+    assert rounded == (1e-9, "N per m", 1.0)
     assert ways.relative(np.nan * off, exact, forces)[0] == np.inf
 
 
@@ -138,8 +139,7 @@ def test_rounding_is_carried_through_a_step_that_grows():
 
 def test_tmt_is_compared_with_mujocos_own_centred_function():
     ways_to_it = "mjd, one-sided", "differences, centred", "mjd, centred", ways.COMPILED
-    about = {"quantity": "A", "best_eps": None, "error": 0.0, "error_at_usual": None, "time": 1.0}
-    costs = [CostRow(way=way, **about) for way in ways_to_it]
+    costs = [CostRow(quantity="A", way=way, best_eps=None, error=0.0, time=1.0) for way in ways_to_it]
     assert of_mujoco(costs, "A") is costs[2] and of_mujoco(costs, "B") is None
 
 
@@ -147,10 +147,9 @@ def test_where_differences_lose_digits_is_said(bent):
     about = {"quantity": "A and B, RK4", "way": "a", "eps": 1e-5, "states": 1, "largest": 1.0}
     about["unit"] = "rad per rad"
     rows = [DerivativeRow(subject="stiff servos", error=error, **about) for error in (1e-7, 9e-9, None, 1e-9)]
-    pairs = [{"pairs": [{"row": row, "scenes": rows[3]}]} for row in rows[:3]]
-    said = [say(Finding("derivatives", "hard", pair)) for pair in pairs]
-    assert "stiff servos: 1e-07 with eps 1e-05 (A and B, RK4, rad per rad" in said[0]
-    assert "lose digits" in said[0]
+    pairs = [{"row": row, "scenes": rows[3]} for row in rows[:3]]
+    said = [say(Finding("derivatives", "hard", {"pairs": [pair]})) for pair in pairs]
+    assert "lose digits: stiff servos: 1e-07 with eps 1e-05 (A and B, RK4, rad per rad" in said[0]
     assert "the same eps serves" in said[1] and "not finite" in said[2]
     finer = dataclasses.replace(rows[0], eps=1e-6)
     assert worst_of_each_eps(rows) == {1e-5: rows[2]} and best_of([*rows, finer]) is finer
@@ -159,8 +158,8 @@ def test_where_differences_lose_digits_is_said(bent):
 def test_hard_states_are_those_of_critical_dampers_and_of_the_least_definite_matrix(bent):
     stiff = subjects.stiff(bent, DT)
     assert min(stiff.tree.stiffness) > 1e3 * DT and stiff.q.shape == (1, 3)
-    # 2 / rate, the rate 2 / DT
-    assert stiff.tree.damping == pytest.approx(DT * np.array(stiff.tree.stiffness))
+    damping = DT * np.array(stiff.tree.stiffness)  # 2 / rate, the rate 2 / DT
+    assert stiff.tree.damping == pytest.approx(damping)
     M = tmt.mass_matrix(bent.q)
     roots = np.sqrt(np.einsum("sii->si", M))
     least = np.linalg.eigvalsh(M / (roots[:, :, None] * roots[:, None, :]))[:, 0]

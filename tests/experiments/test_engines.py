@@ -16,8 +16,11 @@ from trees import tree_of_kinds
 
 from compare import engines
 from compare.core.check import About, Result
-from compare.engines import EngineRecord, Method
-from compare.engines.outside.model import FROM_FILE, File, ReadModel, combined, links_of, numbers_of, size_of
+from compare.engines import EngineRecord
+from compare.engines.outside.bodies import Body, combined, links_of, numbers_of, size_of
+from compare.engines.outside.file import File
+from compare.engines.outside.model import FROM_FILE, ReadModel
+from compare.engines.outside.order import Order
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
 from compare.judge.entries import Entries
@@ -39,7 +42,9 @@ import numpy as np
 import tmt
 
 from . import EngineRecord
-from .outside.model import ReadModel, Unread, numbers_of
+from .outside.bodies import numbers_of
+from .outside.model import ReadModel
+from .outside.order import Order
 
 ENGINE = EngineRecord(order=90, label="{label}", reads_file=True, precision="{precision}")
 METHODS = {{"rk4": (4, "rk4"), "Euler": (1, "semi_implicit_euler"), "free": (None, "own")}}
@@ -49,25 +54,27 @@ class Model(ReadModel):
     def __init__(self, file, precision):
         from .mujoco import read
 
-        tree = read(file.path).tree
+        self.file, tree = file, read(file.path).tree
+        self.order = Order(file, {{0: (0, 0), 1: (1, 1)}})
         self.tree = dataclasses.replace(tree, {wrong})
 
-    def numbers(self):
-        return {{name: values for name, values in numbers_of(self.tree).items() if name not in ("about_origin", "{untold}")}}
+    def fields(self):
+        told = numbers_of(self.tree)
+        return {{name: told[name] for name in told if name not in ("about_origin", "{untold}")}}
 
-    def mend(self, name, values):
+    def set_field(self, name, values):
         if name == "gravity":
             self.tree = dataclasses.replace(self.tree, gravity=values)
         return name == "gravity"
 
-    def mass_matrix(self, q):
-        return tmt.mass_matrix(q, self.tree)
+    def mass_matrix(self, at):
+        return tmt.mass_matrix(at.x, self.tree)
 
-    def bias(self, q, v):
-        return tmt.bias(q, v, self.tree)
+    def bias(self, at):
+        return tmt.bias(at.x, at.u, self.tree)
 
-    def acceleration(self, q, v, force):
-        return tmt.acceleration(q, v, force, dataclasses.replace(self.tree, damping=[0.0] * len(v)))
+    def acceleration(self, at, force):
+        return tmt.acceleration(at.x, at.u, force, dataclasses.replace(self.tree, damping=[0.0] * len(force)))
 
     def run(self, course):
         q, v, tau, times, steps, method, tolerance, _ = course
@@ -160,8 +167,8 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
 def test_two_verdicts_stand_side_by_side(report):
     """As read, and as set: gravity can be set, mass and axis cannot; who takes no part is not counted among those who agree."""
     rows = {row["engine"]: row for row in table(report[0], "engines_answer")}
-    verdicts = [(rows[label]["as_read"], rows[label]["as_set"]) for label in ("Right", "Upside", "Heavy")]
-    assert verdicts == [("same", "same"), ("gravity", "same"), ("mass", "not set")]
+    verdicts = {"Right": ("same", "same"), "Upside": ("gravity", "same"), "Heavy": ("mass", "not set")}
+    assert {label: (rows[label]["as_read"], rows[label]["as_set"]) for label in verdicts} == verdicts
     assert rows["Later"]["as_set"] == "same" and "Blind" not in rows
     shares = {(row["engine"], row["quantity"]): row for row in table(report[0], "engines")}
     assert float(shares["Upside", "bias"]["as_read_over_bar"]) > 1e6
@@ -234,7 +241,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
     root, ends = report[0].parent, "__import__('os')._exit(3)"
-    mortal = AGAIN.replace("return tmt.mass_matrix(q, self.tree)", ends)
+    mortal = AGAIN.replace("return tmt.mass_matrix(at.x, self.tree)", ends)
     (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
     (root / "asked.py").write_text(ASKED)
     command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
@@ -245,17 +252,21 @@ def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_
 class OfTree(ReadModel):
     """A Tree as an engine that tells where its bodies are."""
 
-    has_places = True
+    has_links = True
 
     def __init__(self, tree):
         self.tree, self.stated = tree, numbers_of(tree)
         self.file = File(ROOT, tree.joint_names, tree.kind)
+        joints = self.file.coordinates.places.joints
+        self.order = Order(self.file, {k: (joint.q.start, joint.qd.start) for k, joint in enumerate(joints)})
 
     def fields(self):
         return {}
 
-    def links(self, q):
-        return links_of(self.tree, q)
+    def links(self, at):
+        return links_of(self.tree, at.x)
+
+    mass_matrix = bias = acceleration = None
 
 
 @pytest.mark.parametrize("number", ("axis", "offset", "mass"))
@@ -275,7 +286,7 @@ def test_axes_anchors_and_masses_are_those_by_which_the_bodies_move(number):
 
 def test_bodies_that_move_as_one():
     """Two points of 1 kg at 1 m from each other: 2 kg, and moments 0, 1/2, 1/2 kg m2 about their centre."""
-    mass, _, inertia = combined([(1.0, np.array([0.0, 0.0, z]), np.zeros((3, 3))) for z in (1.0, 2.0)])
+    mass, _, inertia = combined([Body(1.0, np.array([0.0, 0.0, z]), np.zeros((3, 3))) for z in (1.0, 2.0)])
     assert mass == 2.0 and np.linalg.eigvalsh(inertia) == pytest.approx([0.0, 0.5, 0.5])
     with_armature = dataclasses.replace(ARM.tree, armature=[0.1, 0.2, 0.3])
     assert numbers_of(with_armature)["armature"] == pytest.approx([0.1, 0.2, 0.3])
@@ -291,11 +302,3 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     assert integrators.order_of(steps, errors, 1e-2) is None
     finer = [2.0**-k for k in range(7, 14)]
     assert integrators.order_of(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
-
-
-def test_a_step_is_compared_with_the_same_scheme():
-    setup, result = setup_of(), Result("engines")
-    for scheme, passes in (("semi_implicit_euler", True), ("explicit_euler", False)):
-        method = Method("mujoco", "Euler", 1, scheme)
-        integrators.compare_steps(result, setup, setup.engines["mujoco"], method)
-        assert result.checks[-1].passed == passes and result.checks[-1].tolerance < 1e-11  # rounding alone

@@ -10,9 +10,10 @@ import pytest
 from compare import experiments
 from compare.core import timing
 from compare.core.errors import Refused
-from compare.engines import RECORDS, Motion
+from compare.engines import RECORDS
 from compare.engines.outside import Outside, servos_of
-from compare.engines.outside.model import FROM_FILE, numbers_of
+from compare.engines.outside.bodies import numbers_of
+from compare.engines.outside.model import FROM_FILE
 from compare.experiments.engines import batches, rows, servos
 from compare.experiments.engines.answer import cheapest_engine, cheapest_of
 from compare.experiments.engines.integrators import step_of
@@ -50,38 +51,15 @@ def test_what_each_integrator_takes_explicitly_in_a_servo(setup):
     assert [note.kind for note in result.notes] == ["response"] * 4
 
 
-def test_a_torque_that_is_held_is_told_from_one_that_is_not(setup):
+def test_a_torque_that_is_held_is_told_from_one_that_is_not(setup, monkeypatch):
     """And a response that is like none is not explained."""
     case, method = servos.scene_of(setup), setup.engines["mujoco"].methods["RK4"]
     path = servos.held(case, 256)
     assert servos.explanation(case, setup.engines["mujoco"], method, 256, path)[0] == "held"
     another = path + np.linspace(0.0, 1.0, len(path))[:, None]
-    explained = servos.explanation(case, Diverging(setup.engines["mujoco"]), method, 256, another)
-    assert explained[0] == ""
-
-
-class Diverging:
-    """An engine whose error does not fall with its step."""
-
-    name = "mujoco"
-
-    def __init__(self, engine):
-        self.engine = engine
-
-    def of(self, case):
-        dynamics = self.engine.of(case)
-
-        class Off:
-            def prepare(self, *arguments):
-                run, read = dynamics.prepare(*arguments)
-
-                def off(outcome):
-                    motion = read(outcome)
-                    return Motion(motion.t, motion.q + 1.0, motion.v)
-
-                return run, off
-
-        return Off()
+    run = SimpleNamespace(error=np.ones(65))  # with half of the step: it does not fall
+    monkeypatch.setattr(servos, "follow", lambda *arguments: run)
+    assert servos.explanation(case, setup.engines["mujoco"], method, 256, another)[0] == ""
 
 
 @pytest.mark.parametrize("damping, why", ((0.2, "damping_implicit"), (1.0, "reading")))
@@ -191,19 +169,23 @@ def test_without_an_extra_mujoco_and_tmt_are_compared(mujoco, monkeypatch):
     chosen = {name: engine for name, engine in engines(mujoco).items() if name not in others}
     result = rows(Setup.small(ARM, chosen))
     assert len(result.checks) >= 5 and all(check.passed for check in result.checks)
+    steps = [check.tolerance for check in result.checks if check.quantity.startswith("one step")]
+    assert len(steps) > 2 and max(steps) < 1e-11  # rounding alone
     assert [row.engine for row in result.tables["engines_answer"]] == ["MuJoCo", "TMT"]
 
 
 def test_a_cause_is_named_where_the_engine_has_what_follows_from_it(tmp_path):
-    """A gravity that was ignored; another one is not explained by that."""
+    """A gravity that was ignored; another one is not explained by that. Other joints are no refusal."""
     path = tmp_path / "robot.xml"
     path.write_text(LEG.replace("<worldbody>", '<option gravity="1 2 -3"/><worldbody>'))
-    robot, kinds = compared_with("model", str(path)).robot, []
+    robot, named = compared_with("model", str(path)).robot, []
     stated = numbers_of(robot.tree)
-    for gravity in ((0.0, 0.0, -9.81), (1.0, 2.0, 3.0)):
-        reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": None,
+    copied = ("Refused", ""), ("OtherJoints", "")
+    for gravity, why in zip(((0.0, 0.0, -9.81), (1.0, 2.0, 3.0)), copied):
+        reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": why,
                    "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
         result = EnginesResult("engines", tables={"engines_read": []})
         compare_numbers(result, robot, RECORDS["drake"], reading)
-        kinds.append({row.cause for row in result.tables["engines_read"]})
-    assert kinds == [{"option_gravity gravity"}, {None}]
+        (cause,) = {row.cause for row in result.tables["engines_read"]}
+        named.append((cause, result.readers["Drake"].differing))
+    assert named == [("option_gravity gravity", ["refused", "gravity"]), (None, ["joints", "gravity"])]

@@ -1,5 +1,6 @@
 """Where a model rests: what falls, is left, is told; and what limits its step there."""
 
+import mujoco
 import numpy as np
 import pytest
 from small import BOX, CASTER, INERTIA, KINDS, LEG, STANDING, hinge, limit_of, place_of, rest_of
@@ -66,8 +67,10 @@ def test_what_falls_has_no_rest_and_one_in_the_air_has():
     assert in_the_air_at(place_of(hinge())) is None  # nothing touches it, and it rests
 
 
-def test_in_the_air_a_free_base_has_no_weight_and_a_fixed_one_has():
-    for text, weightless in ((BOX, True), (CASTER, True), (LEG, False)):
+def test_in_the_air_a_base_that_would_fall_has_no_weight_and_a_fixed_one_has():
+    """A base falls that has a free joint, or slides downwards with nothing on its joint."""
+    hanging = LEG.replace('name="lift"', 'name="lift" stiffness="900"')
+    for text, weightless in ((BOX, True), (CASTER, True), (LEG, True), (hanging, False)):
         air = in_the_air_at(place_of(text))
         assert (air.surroundings, air.is_touching) == ("air", False)
         assert (not air.model.opt.gravity.any()) is weightless
@@ -97,6 +100,16 @@ def test_all_rows_of_a_contact_are_its_own(cone, counts):
     assert rows_at(rest.step, rest.state)[1].contact.tolist() == [-1]
 
 
+def test_the_steps_of_a_model_share_a_copy_and_each_has_its_own_options():
+    model = mujoco.MjModel.from_xml_string("<mujoco><option tolerance='1e-4'/></mujoco>")
+    exact, other = Step(model, 0.01, "Euler"), Step(model, 0.02, "RK4", exact=False)
+    assert exact.model is other.model is not model
+    for step, expected in ((exact, (0.01, 1e-15)), (other, (0.02, 1e-4))):
+        step.set_options()
+        assert (step.model.opt.timestep, step.model.opt.tolerance) == expected
+    assert (model.opt.timestep, model.opt.tolerance) == (0.002, 1e-4)
+
+
 def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():
     place = place_of(POLE.format("").replace('damping="0.05"', ""))
     step = Step(place.model, 1e-3, "Euler")
@@ -120,7 +133,7 @@ def test_what_bounces_is_not_in_the_air():
     place = place_of(box)
     assert place.surroundings == "contact"
     row, _ = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))
-    assert row.limit == "moving" and row.stable_at_file_dt is False and 1e-4 < row.own_dt < 2e-3
+    assert row.limit == "moving" and row.stable_at_file_dt is False and 1e-4 < row.longest < 2e-3
 
 
 def test_a_loose_object_that_moves_on_is_named_and_hides_nothing():

@@ -1,5 +1,6 @@
 """What runs show: limits, growth, pushes; dry friction; controllers at their own rate; motions; and changes that help."""
 
+from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
 
@@ -17,20 +18,12 @@ from compare.engines.mujoco.variants import (
 )
 from compare.stability import cures
 from compare.stability.control import controlled
-from compare.stability.growth import grows, growth, has_grown
+from compare.stability.growth import growth, has_grown
 from compare.stability.limits import Limit, Tried, tried
 from compare.stability.motion import motion
-from compare.stability.rest import rest_near
-from compare.stability.runs import (
-    PUSHES,
-    USUAL_PUSH,
-    growth_in_run,
-    largest_push,
-    observed,
-    own_limit,
-    stays_still,
-)
+from compare.stability.runs import PUSHES, USUAL_PUSH, Runs, growth_in_run, upwards
 
+WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
 RUBBING = hinge(20.0, 30.0, 'frictionloss="0.3"')
 MOTORS = '<motor joint="turn" gear="2"/>'
@@ -41,6 +34,13 @@ SWING = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="a" axi
   <geom size="0.05" pos="0 0 -0.5" mass="1"/></body></worldbody><keyframe><key qvel="3"/></keyframe></mujoco>"""
 
 
+def runs_of(text, integrator="Euler"):
+    """Runs of a model from its rest; fine steps are those of 0.25 ms."""
+    place = place_of(text)
+    held = rest_of(text, 2e-3, integrator).is_held
+    return Runs(place.model, place.rest, integrator, 2.5e-4, held, lambda dt: 0.0)
+
+
 @pytest.mark.parametrize("text, integrator", [
     (FOOT, "Euler"), (FOOT, "RK4"), (KINDS["pyramidal, condim 6"], "Euler"), (KINDS["a muscle"], "RK4"),
     (KINDS["a DC motor"], "Euler"), (KINDS["friction loss"], "Euler"), (KINDS["fluid"], "Euler"),
@@ -49,35 +49,25 @@ SWING = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="a" axi
 def test_runs_show_the_limit_within_three_hundredths(text, integrator):
     found = limit_of(text, integrator)
     assert found.kind == "finite"
-    below, above = observed(place_of(text).model, found, integrator)
+    below, above = runs_of(text, integrator).limit(2e-3, found.dt)
     assert (below, above) == (pytest.approx(0.97 * found.dt), pytest.approx(1.03 * found.dt))
 
 
-def test_runs_follow_the_rest_from_the_one_below_their_step_and_creep_as_those_near_it():
-    """At the limit of a body that tips over another rest is near: from there runs failed at every step."""
+def test_runs_creep_as_the_rests_near_their_step():
     rests = {dt: SimpleNamespace(state=dt, speeds=np.array([-dt])) for dt in (2.0, 6.0, 4.0, 3.0)}
     tries = [SimpleNamespace(dt=dt, is_stable=dt != 4.0, rest=rest) for dt, rest in rests.items()]
     found = Limit("finite", 3.0, None, SimpleNamespace(state=9.0), tries)
-    assert [found.state_below(dt) for dt in (1.9, 2.9, 5.0, 7.0)] == [9.0, 2.0, 3.0, 6.0]
     assert [found.creep_near(dt) for dt in (1.0, 1.4, 2.1, 4.1)] == [0.0, 2.0, 3.0, 6.0]
 
 
 @pytest.mark.parametrize("more, stable", [
-    ({}, True), ({"moved": 0.31}, False), ({"run_grows": True}, False), ({"rest": SimpleNamespace(is_found=False)}, False),
+    ({}, True), ({"moved": 0.31}, False), ({"rest": SimpleNamespace(is_found=False)}, False),
     ({"growth": SimpleNamespace(rate=0.11)}, False), ({"growth": SimpleNamespace(rate=0.11), "drift": 0.056}, True),
 ])  # fmt: skip
 def test_a_step_is_stable_at_a_rest_nearby_where_nothing_grows_faster_than_what_grows_by_itself(more, stable):
     usual = {"rest": SimpleNamespace(is_found=True), "growth": SimpleNamespace(rate=0.09)}
-    usual |= {"dt": 0.1, "drift": 0.0, "moved": 0.29, "run_grows": False}
+    usual |= {"dt": 0.1, "drift": 0.0, "moved": 0.29}
     assert Tried(**usual | more).is_stable is stable
-
-
-@pytest.mark.parametrize("noise, uncertain", [(0.0, False), (0.02, True)])
-def test_growth_within_the_noise_of_differences_is_left_to_a_run(noise, uncertain):
-    A = np.diag([1.01, 0.5])
-    step = SimpleNamespace(dt=0.01, derivative=lambda state, nudge: A + noise * np.eye(2))
-    found = growth(SimpleNamespace(A=A, state=None, step=step))
-    assert (found.is_uncertain, found.factor > 1.0) == (uncertain, not uncertain)
 
 
 def test_growth_in_a_run_is_that_of_the_step():
@@ -105,7 +95,7 @@ def test_dry_friction_holds_small_deviations_alone():
     free = place.frictionless
     assert not free.dof_frictionloss.any() and place_of(hinge()).frictionless is None
     assert [tried(free, place.rest, by * smooth, "Euler").is_stable for by in (0.99, 1.01)] == [True, False]
-    pushes = [largest_push(place.model, rest_of(RUBBING, by * smooth), 0.0) for by in (0.9, 1.5)]
+    pushes = [runs_of(RUBBING).largest_push(by * smooth) for by in (0.9, 1.5)]
     assert pushes[0] == (PUSHES[0], None) and 0.0 < pushes[1][0] < 0.1 and not pushes[1][1]
 
 
@@ -116,22 +106,44 @@ def test_a_servo_too_weak_for_a_push_bears_it_at_no_step():
         '<body><joint name="a" axis="0 1 0" damping="0.06"/><geom size="0.02" pos="0 0 0.1" mass="1"/></body>'
     )
     text = f"<mujoco><worldbody>{body}</worldbody><actuator>{servo}</actuator></mujoco>"
-    largest, finer_too = largest_push(place_of(text).model, rest_of(text), 0.0)
+    largest, finer_too = runs_of(text).largest_push(2e-3)
     assert 1e-3 < largest < USUAL_PUSH and finer_too
     free = hinge(actuator=MOTORS)  # nothing brakes it: it moves on as at a finer step
-    assert largest_push(place_of(free).model, rest_of(free), 0.0) == (USUAL_PUSH, None)
+    assert runs_of(free).largest_push(2e-3) == (USUAL_PUSH, None)
 
 
-def test_the_files_own_run_stays_still_up_to_a_step():
-    """From a start beside the rest: a servo with kv, and one without, which swings for ever."""
-    place, swinging = place_of(hinge(20.0, 5.0)), place_of(hinge(20.0, 0.0))
-    start = Step(place.model, 1e-3, "Euler").moved(place.rest, np.array([1e-2, 0.0]))
-    assert [stays_still(place.model, start, dt, "Euler", 0.0) for dt in (2e-3, 0.03)] == [True, False]
-    still = [stays_still(swinging.model, start, 2e-3, "Euler", creep) for creep in (0.04, 0.06)]
-    assert still == [False, True]
+def test_the_first_step_at_which_the_files_run_fails_is_found_wherever_the_derivative_has_its_limit():
+    """From a start beside the rest: a servo with kv, and one without, which swings for ever, at 0.04 rad/s."""
+    start = Step(place_of(WITH_KV).model, 1e-3, "Euler").moved(place_of(WITH_KV).rest, np.array([2e-3, 0.0]))
+    shown = replace(runs_of(WITH_KV), state=start)
     exact = (-5.0 + np.sqrt(25.0 + 4.0 * INERTIA * 20.0)) / 20.0
-    assert 0.97 * exact < own_limit(place.model, start, "Euler", 0.05, lambda dt: 0.0) < exact
-    assert own_limit(place.model, start, "Euler", 0.01, lambda dt: 0.0) == 0.01
+    for first, predicted in ((2e-3, 0.1), (2e-3, 0.005), (0.1, np.inf), (0.05, 0.03), (2e-3, exact)):
+        low, high = shown.limit(first, predicted)
+        assert low < 1.03 * exact and 0.97 * exact < high < 1.066 * low
+    swinging = replace(runs_of(hinge(20.0, 0.0)), state=start)
+    calm = [replace(swinging, creep_at=lambda dt, by=by: by).is_calm(1e-3, 2e-3) for by in (0.005, 0.02)]
+    assert calm == [False, True]
+    assert runs_of(hinge(20.0, 5.0, integrator="implicitfast"), "implicitfast").limit(2e-3, np.inf) == (
+        0.2,
+        None,
+    )
+
+
+def test_a_body_that_leaves_at_fine_steps_too_has_no_limit_of_the_step():
+    """A weight that hovers: a push turns it, and it sinks sideways."""
+    hover = """<mujoco><option timestep="0.01"/><worldbody><body pos="0 0 9"><freejoint/>
+      <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.02"/><site name="up"/></body></worldbody>
+      <actuator><motor site="up" gear="0 0 1 0 0 0"/></actuator><keyframe><key qpos="0 0 9 1 0 0 0" ctrl="9.81"/></keyframe>
+      </mujoco>"""
+    shown = runs_of(hover)
+    assert shown.speed_after(1e-3, 0.01, 4.0) > 0.05
+    assert shown.limit(0.01, np.inf) == (0.2, None)
+
+
+def test_steps_upwards_have_both_sides_of_a_limit_and_no_gap():
+    steps = [0.002, *upwards(0.002, 0.1)]
+    assert [steps.count(pytest.approx(mark)) for mark in (0.097, 0.103, 0.2)] == [1, 1, 1]
+    assert max(np.divide(steps[1:], steps[:-1])) < 1.500001 and steps == sorted(steps)
 
 
 # controllers
@@ -226,8 +238,9 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula(monkeypatch):
     """4 I > 2 dt kv + dt^2 kp, 1 % above the step."""
     kp, kv, dt, inertia = 20.0, 30.0, 0.02, INERTIA + 0.01
     place, above = place_of(hinge(kp, kv, 'armature="0.01"')), 0.02 * cures.SPARE
-    assert grows(rest_near(Step(place.model, dt, "Euler"), place.rest))
-    found = {cure.change: cure.factor for cure in cures.cures(place.model, place.rest, dt, "Euler")}
+    shown = runs_of(hinge(kp, kv, 'armature="0.01"'))
+    assert not shown.survives(1e-3, dt)
+    found = {cure.change: cure.factor for cure in cures.cures(shown, dt)}
     less = 2.0 * above * kv / (4.0 * inertia - above**2 * kp)
     more = (2.0 * above * kv + above**2 * kp) / (4.0 * inertia) - 1.0
     assert found.keys() == {"less_kv", "more_armature"}
@@ -235,20 +248,21 @@ def test_the_least_changes_of_one_hinge_are_those_of_the_formula(monkeypatch):
     assert 0.999 * more < found["more_armature"] < cures.WITHIN * more
     weaker = with_kv(place.model, 1.0 / found["less_kv"])
     heavier = with_armature(place.model, found["more_armature"])
-    assert not any(grows(rest_near(Step(changed, dt, "Euler"), place.rest)) for changed in (weaker, heavier))
-    monkeypatch.setattr(cures, "grows", lambda rest: True)
-    assert cures.cures(place.model, place.rest, dt, "Euler") == []  # a run has the last word
+    assert all(replace(shown, model=changed).survives(1e-3, dt) for changed in (weaker, heavier))
+    monkeypatch.setattr(Runs, "survives", lambda runs, push, dt: False)
+    assert cures.cures(shown, dt) == []  # a run has the last word
 
 
 def test_what_helps_a_standing_leg_holds_in_a_run_and_half_of_it_does_not():
     place, dt = place_of(FOOT), 1.3 * limit_of(FOOT, "implicitfast").dt
     made = {change.name: change for change in cures.CHANGES}
-    found = cures.cures(place.model, place.rest, dt, "implicitfast")
+    shown = runs_of(FOOT, "implicitfast")
+    found = cures.cures(shown, dt)
     assert {cure.change for cure in found} & {"less_kv", "more_armature", "slower_contacts"}
     for cure in found:
         change = made[cure.change]
         changed = change.made(place.model, cure.factor)
-        assert not grows(rest_near(Step(changed, dt, "implicitfast"), place.rest))
+        assert replace(shown, model=changed).survives(1e-6, dt)
         if cure.factor > change.first * cures.WITHIN**2:
             less = change.made(place.model, cure.factor / cures.WITHIN**2)
             assert not tried(less, place.rest, cures.SPARE * dt, "implicitfast").is_stable

@@ -121,8 +121,6 @@ def test_what_cannot_be_derived_is_one_line():
         with pytest.raises(ValueError, match=words) as error:
             symbolic(tree, limit=0.2)
         assert "\n" not in str(error.value)
-    with pytest.raises(ValueError, match="unknown quantity 'energy'"):
-        symbolic(tmt.ARM, ("energy",))
 
 
 def test_python_text_is_accepted_by_the_comparison():

@@ -14,7 +14,7 @@ from tmt.derivation.dual import seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
-from tmt.derivation.vectors import Rows, Scalar, Scalars, Values
+from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.methods import Linearized, method_named, one_step
 from tmt.methods.stepping import Dynamics, Held, Method, minus, plus
 from tmt.model.tree import Tree
@@ -27,16 +27,9 @@ MANY = 20  # speeds from which derivatives are not traced by dual numbers
 DENSE = 10  # speeds up to which linear systems are solved in straight lines, and the bias is differentiated by dual numbers
 
 
-def mixed(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
-    """Mbar in the axes of the world, h in the frames of the joints."""
-    M, _ = articulated.mass_matrix_and_bias(tree, q, [0.0] * len(qd))
-    return M, composite.mass_matrix_and_bias(tree, q, qd)[1]
-
-
 FORMS = (
     Form(composite.mass_matrix_and_bias, composite.generalized_force),
     Form(articulated.mass_matrix_and_bias, articulated.generalized_force, linearized.rates),
-    Form(mixed, composite.generalized_force, linearized.rates),
 )
 LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of derivatives
 
@@ -121,8 +114,8 @@ def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | 
 
     if name == "acceleration":
         return shortest("quantity", sizes, by_dynamics, all_dynamics(tree))
-    long_forms = (*FORMS[: n < MANY], *LONG_FORMS)  # the first by dual numbers
-    return shortest("quantity", sizes, in_form, long_forms if row.is_long else FORMS)
+    some = (*FORMS[: n < MANY], *LONG_FORMS) if row.is_long else FORMS  # the first by dual numbers
+    return shortest("quantity", sizes, in_form, some if row.has_forms else some[:1])
 
 
 def values_in(form: Form, tree: AnyTree, name: str, arrays: Mapping[str, Values]) -> Values:

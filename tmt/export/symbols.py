@@ -50,11 +50,9 @@ def symbolic(
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
     limit: the work that it may take, s of a processor core of 2026, counted and not measured; where half of it
-    does not do with named parameters, they are numbers. Raises ValueError for a ball, an unknown quantity, and
-    where it takes more.
+    does not do with named parameters, they are numbers. Raises ValueError for a ball, and where it takes
+    more.
     """
-    if unknown := [name for name in quantities if name not in QUANTITIES]:
-        raise ValueError(f"unknown quantity {unknown[0]!r}; known: {', '.join(QUANTITIES)}")
     for name, kind in zip(tree.joint_names, tree.kind):
         if kind == "ball":
             raise ValueError(f"symbolic equations need hinges and slides; joint {name} is a ball")

@@ -7,6 +7,7 @@ import math
 import numbers
 import os
 import reprlib
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 def shown(value: Any) -> str:
     """What was given, in one short line."""
     try:
-        return " ".join(reprlib.repr(value).split())
+        return textwrap.shorten(reprlib.repr(value), 90, placeholder=" ...")
     except Exception:  # a repr that fails, an int of too many digits
         return f"a {type(value).__name__}"
 

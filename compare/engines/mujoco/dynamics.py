@@ -88,30 +88,20 @@ class MujocoDynamics:
         """T_b and B_b, (..., m, 3, nv): mj_jacBodyCom, its rotational part turned into body axes."""
 
         def both(d: mujoco.MjData) -> np.ndarray:
-            return self._of_bodies(lambda T, B, body: mujoco.mj_jacBodyCom(self.model, d, T, B, body))
+            pair = np.zeros((2, len(self.bodies), 3, self.model.nv))
+            for T, B, body in zip(*pair, self.bodies):
+                mujoco.mj_jacBodyCom(self.model, d, T, B, body)
+            T, B = pair[..., self.dofs]
+            return np.stack([T, self._to_body(B)])
 
         T, B = np.moveaxis(self._each(both, q), -4, 0)
         return T, B
 
     def convective_terms(self, q: Array, v: Array) -> Pair:
-        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_jacDot times qvel; with balls accelerations.
+        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_objectAcceleration at qacc = 0 without gravity.
 
         mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body.
         """
-        if self.coordinates.has_balls:
-            return self._convective_accelerations(q, v)
-
-        def terms(d: mujoco.MjData) -> np.ndarray:
-            def rates(T: np.ndarray, B: np.ndarray, body: int) -> None:
-                mujoco.mj_jacDot(self.model, d, T, B, d.xipos[body], body)
-
-            return self._of_bodies(rates) @ d.qvel[self.dofs]
-
-        v_conv, w_conv = np.moveaxis(self._each(terms, q, v), -3, 0)
-        return v_conv, w_conv
-
-    def _convective_accelerations(self, q: Array, v: Array) -> Pair:
-        """The accelerations of the bodies at qacc = 0 without gravity: mj_objectAcceleration."""
         model, gravity = self.model, self.model.opt.gravity.copy()
 
         def terms(d: mujoco.MjData) -> Pair:
@@ -320,11 +310,3 @@ class MujocoDynamics:
         """World components to body axes, the axes of the world at the position zero."""
         turns = self.turns(self.data.xmat) @ self.zero_axes.transpose(0, 2, 1)
         return np.einsum("bji,bj...->bi...", turns, vectors)
-
-    def _of_bodies(self, fill: Callable[[np.ndarray, np.ndarray, int], None]) -> np.ndarray:
-        """(translation, rotation) rows that fill(T, B, body) gives, (2, m, 3, nv): our joints, rotation in body axes."""
-        pair = np.zeros((2, len(self.bodies), 3, self.model.nv))
-        for T, B, body in zip(*pair, self.bodies):
-            fill(T, B, body)
-        T, B = pair[..., self.dofs]
-        return np.stack([T, self._to_body(B)])

@@ -1,7 +1,6 @@
 """The compiled model for other engines: as it is, and as a URDF text where a reader of MJCF loses masses or joints."""
 
-from collections.abc import Callable, Sequence
-from types import SimpleNamespace
+from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import mujoco
@@ -9,27 +8,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...robots.actuators import Controller
-from ..outside.model import combined
 from .dynamics import Engaged
 from .engine import engaged
 from .inventory import switch_off, take_away
-from .names import INTEGRATORS, bit, joint_name, joint_places, kind_of, matrix, rotors, tensor
-from .reading import carriers
+from .names import INTEGRATORS, bit, joint_name, joint_places, kind_of, matrix, rotors
 from .source import Source
 
-HELD = (
-    "body_parentid", "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_bodyid",
-    "jnt_stiffness", "dof_jntid", "dof_armature", "dof_damping",
-)  # fmt: skip
-KINDS = {"hinge": "continuous", "slide": "prismatic"}
+KINDS = {"hinge": "continuous", "slide": "prismatic", "free": "floating"}
 NO_JOINT = -1
 FAR = "1e9"  # limits that nothing reaches: a prismatic joint has to state some
 
 
-def urdf(compiled: mujoco.MjModel, has_free_bodies: bool = False) -> str:
+def urdf(compiled: mujoco.MjModel) -> str:
     """A URDF text of a compiled model; ValueError where it cannot be one.
 
-    Its base is fixed; has_free_bodies: with free joints, of type floating, of which readers make what they like.
+    Free joints are of type floating, of which readers make what they like.
 
     Numbers have 17 significant digits; positions are those of the file (`ref` included), joints have its names. The
     frame of a link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link
@@ -40,9 +33,8 @@ def urdf(compiled: mujoco.MjModel, has_free_bodies: bool = False) -> str:
     take_away(model)  # what a flag of the file disables is zero
     names = [joint_name(model, j) for j in range(model.njnt)]
     for j, name in enumerate(names):
-        if (kind := kind_of(model, j)) not in KINDS and not (has_free_bodies and kind == "free"):
-            only = "a URDF with a fixed base has only hinges and slides"
-            raise ValueError(f"joint {name!r} is of type {kind}; {only}")
+        if (kind := kind_of(model, j)) not in KINDS:
+            raise ValueError(f"joint {name!r} is of type {kind}, which a URDF does not have")
     robot = Element("robot", name="robot")
     SubElement(robot, "link", name="link0")
     origins = [np.zeros(3)]  # of the link of each body, in the frame of the body
@@ -76,8 +68,8 @@ def urdf(compiled: mujoco.MjModel, has_free_bodies: bool = False) -> str:
 
 def joint_of(model: mujoco.MjModel, j: int, kind: str, name: str) -> Element:
     """A joint without its place; kind: of MuJoCo's joint j, "" for a fixed one."""
-    joint = Element("joint", name=name, type=KINDS.get(kind, "floating" if kind else "fixed"))
-    if kind in KINDS:
+    joint = Element("joint", name=name, type=KINDS.get(kind, "fixed"))
+    if kind in ("hinge", "slide"):
         SubElement(joint, "axis", xyz=text(model.jnt_axis[j]))
         damping = text(model.dof_damping[model.jnt_dofadr[j]])
         SubElement(joint, "dynamics", damping=damping, friction="0")
@@ -138,6 +130,7 @@ class Bare:
         m.opt.disableflags &= ~bit("AUTORESET", "ACTUATION")
         m.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
         m.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # of constraints, which are off; both refuse PGS
+        m.opt.iterations = 0 if controller is None else m.opt.iterations
         if rotors_in_joints and hasattr(m, "actuator_armature"):
             m.dof_armature += rotors(m)
             m.actuator_armature[:] = 0.0
@@ -157,23 +150,3 @@ class Bare:
         """The model, which has this integrator now."""
         self.model.opt.integrator = INTEGRATORS[name]
         return self.model
-
-    def numbers(self, held: Callable[[str], np.ndarray]) -> dict[str, np.ndarray]:
-        """ReadModel.numbers, except gravity, of what an engine holds by MuJoCo's names, see HELD."""
-        m = SimpleNamespace(nbody=self.model.nbody, **{name: held(name) for name in HELD})
-        carrier, has_joint = carriers(m, list(self.places.values())), set(m.jnt_bodyid.tolist())
-        frames = [(np.zeros(3), np.eye(3))]  # of each body in the axes of the last one that a joint moves
-        carried: list[list[tuple[float, np.ndarray, np.ndarray]]] = [[] for _ in self.places]
-        for body in range(1, m.nbody):
-            at, turn = frames[0]
-            if body not in has_joint:
-                at, turn = frames[m.body_parentid[body]]
-                at, turn = at + turn @ m.body_pos[body], turn @ matrix(m.body_quat[body])
-            frames.append((at, turn))
-            if carrier[body] >= 0:
-                inertia = turn @ tensor(matrix(m.body_iquat[body]), m.body_inertia[body]) @ turn.T
-                carried[carrier[body]].append((m.body_mass[body], at + turn @ m.body_ipos[body], inertia))
-        mass, _, inertias = map(np.array, zip(*map(combined, carried)))
-        numbers = {"mass": mass, "moments": np.linalg.eigvalsh(inertias)}
-        numbers |= {"armature": m.dof_armature[self.dofs], "damping": m.dof_damping[self.dofs]}
-        return numbers | {"stiffness": m.jnt_stiffness[m.dof_jntid][self.dofs]}

@@ -1,6 +1,6 @@
-"""What a robot does: a motion of a file with everything on, which smaller models of the file repeat; and what it uses."""
+"""What a robot does: motions of a file with everything on, which smaller models of the file repeat; and what they use."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -13,7 +13,10 @@ from .names import INTEGRATORS, bit, control_of, element_name, number_of_actuato
 Array = np.ndarray
 Places = Callable[[mujoco.MjModel], dict[str, tuple[slice, slice]]]  # joints or actuators
 STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-INPUTS = int(mujoco.mjtState.mjSTATE_CTRL) | int(mujoco.mjtState.mjSTATE_QFRC_APPLIED)
+INPUTS = sum(
+    int(getattr(mujoco.mjtState, f"mjSTATE_{name}"))
+    for name in ("CTRL", "QFRC_APPLIED", "MOCAP_POS", "MOCAP_QUAT")
+)
 NEAR, SAMPLES = 0.01, 25  # m, and states of a motion: pairs that came so near are told
 EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
 ACTS = {  # what has a row of constraints, by the kinds of rows
@@ -72,8 +75,7 @@ def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
 class Motion:
     """A motion of a whole model, which smaller ones repeat. Controls are constant between their times.
 
-    start: the state, and the forces that act all the time. inputs: the controls, (times, nu). points: names of sites whose
-    places count too.
+    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls, (times, nu).
     """
 
     name: str
@@ -81,7 +83,6 @@ class Motion:
     start: mujoco.MjData
     times: Array  # s
     inputs: Array
-    points: tuple[str, ...] = ()
 
     def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
         """The data of a model at the start."""
@@ -90,6 +91,7 @@ class Motion:
         controls, activations = columns(model, start.model, actuators)
         data.qpos[:], data.qvel[:], data.qfrc_applied[:] = start.qpos[q], start.qvel[v], start.qfrc_applied[v]
         data.ctrl[:], data.act[:] = self.inputs[0, controls], start.act[activations]
+        data.mocap_pos[:], data.mocap_quat[:] = start.mocap_pos, start.mocap_quat
         return data
 
     def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
@@ -122,35 +124,44 @@ class Path(NamedTuple):
 
 
 class Simulation:
-    """A motion by a model, a step, s, and an integrator; a call repeats it."""
+    """Motions by a model, a step, s, and an integrator; a call repeats them."""
 
-    def __init__(self, model: mujoco.MjModel, motion: Motion, dt: float, integrator: str) -> None:
+    def __init__(self, model: mujoco.MjModel, motions: Iterable[Motion], dt: float, integrator: str) -> None:
         self.model = mujoco.MjModel.__copy__(model)
         self.model.opt.timestep, self.model.opt.integrator = dt, INTEGRATORS[integrator]
         self.model.opt.disableflags |= bit("AUTORESET")
-        self.dt, self.steps, self.data = dt, max(1, round(motion.duration / dt)), motion.placed(self.model)
-        self.start = np.zeros(mujoco.mj_stateSize(self.model, STATE))
-        mujoco.mj_getState(self.model, self.data, self.start, STATE)
-        forces = np.tile(self.data.qfrc_applied, (self.steps, 1))
-        self.inputs = np.hstack([motion.controls(self.model, dt, self.steps), forces])
+        self.dt, self.runs, self.data = dt, list[tuple[Array, Array]](), mujoco.MjData(self.model)
+        for motion in motions:
+            data, steps = motion.placed(self.model), max(1, round(motion.duration / dt))
+            start = np.zeros(mujoco.mj_stateSize(self.model, STATE))
+            mujoco.mj_getState(self.model, data, start, STATE)
+            held = np.r_[data.qfrc_applied, data.mocap_pos.ravel(), data.mocap_quat.ravel()]
+            inputs = np.hstack([motion.controls(self.model, dt, steps), np.tile(held, (steps, 1))])
+            self.runs.append((start, inputs))
+        self.steps = sum(len(inputs) for _, inputs in self.runs)
 
-    def __call__(self) -> Path:
-        nq, nv = self.model.nq, self.model.nv
-        states, _ = rollout.rollout(
-            self.model, self.data, self.start, self.inputs[None], control_spec=INPUTS, nstep=self.steps
-        )
-        path = np.vstack([self.start, states[0]])[:, : 1 + nq + nv]
-        failed = np.cumsum(~(np.diff(path[:, 0], prepend=-1.0) > 0.0)) > 0  # its clock stands still
-        path[failed] = np.nan
-        return Path(self.model, self.dt, path[:, 1 : 1 + nq], path[:, 1 + nq :])
+    def __call__(self) -> list[Path]:
+        nq, nv, paths = self.model.nq, self.model.nv, []
+        for start, inputs in self.runs:
+            states, _ = rollout.rollout(
+                self.model, self.data, start, inputs[None], control_spec=INPUTS, nstep=len(inputs)
+            )
+            path = np.vstack([start, states[0]])[:, : 1 + nq + nv]
+            failed = np.cumsum(~(np.diff(path[:, 0], prepend=-1.0) > 0.0)) > 0  # its clock stands still
+            path[failed] = np.nan
+            paths.append(Path(self.model, self.dt, path[:, 1 : 1 + nq], path[:, 1 + nq :]))
+        return paths
 
     def stepped(self) -> Iterator[mujoco.MjData]:
-        """The data after each step."""
-        mujoco.mj_setState(self.model, self.data, self.start, STATE)
-        for inputs in self.inputs:
-            self.data.ctrl[:] = inputs[: self.model.nu]
-            mujoco.mj_step(self.model, self.data)
+        """The data at each start, before the first step, and after each step."""
+        for start, inputs in self.runs:
+            mujoco.mj_resetData(self.model, self.data)
+            mujoco.mj_setState(self.model, self.data, start, STATE)
             yield self.data
+            for row in inputs:
+                mujoco.mj_setState(self.model, self.data, row, INPUTS)
+                mujoco.mj_step(self.model, self.data)
+                yield self.data
 
 
 def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, float]:
@@ -170,15 +181,17 @@ def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, f
     return largest
 
 
-def apart(path: Path, other: Path, motion: Motion) -> float:
-    """How far a path is from that of another model of the motion, rad or m; inf where one of them fails."""
-    largest = max(movements(path, other, motion.points).values(), default=0.0)
-    return largest if np.isfinite(largest) else np.inf
+def apart(paths: Sequence[Path], others: Sequence[Path], points: Iterable[str] = ()) -> float:
+    """How far the paths of a model are from those of another one, rad or m; inf where one of them fails."""
+    largest = [list(movements(*pair, points).values()) for pair in zip(paths, others)]
+    error = float(np.max(largest, initial=0.0))  # a NaN stays one
+    return error if np.isfinite(error) else np.inf
 
 
 @dataclass
 class Use:
-    """What a motion used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved, rad or m.
+    """What motions used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved
+    from its first position, rad or m.
 
     middle: the mean positions of the joints; of a joint with a quaternion the start.
     """
@@ -195,9 +208,8 @@ class Use:
 
 
 def used(simulation: Simulation) -> Use:
-    """What the motion of a model uses, step by step."""
-    m, use = simulation.model, Use()
-    path, forces = [simulation.data.qpos.copy()], np.zeros(len(simulation.data.actuator_force))
+    """What the motions of a model use, step by step."""
+    m, use, path, forces = simulation.model, Use(), [], np.zeros(len(simulation.data.actuator_force))
     pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
     for d in simulation.stepped():
         pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
@@ -226,14 +238,14 @@ def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
     return one, other
 
 
-def couplings(path: Path, middle: Array) -> Array:
+def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
     """How far each speed would move each other one, were it locked at a position: (nv, nv) rad or m, moved by locked.
 
-    Its own movement times its coupling through M, the largest at sampled states of a path.
+    Its own movement times its coupling through M, the largest at positions (times, nq).
     """
-    model, data = path.model, mujoco.MjData(path.model)
+    data = mujoco.MjData(model)
     costs, inverse, moved = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv)), np.zeros(model.nv)
-    for q in path.samples:
+    for q in positions:
         data.qpos[:] = q
         mujoco.mj_forward(model, data)
         mujoco.mj_solveM(model, data, inverse, np.eye(model.nv))
@@ -243,24 +255,25 @@ def couplings(path: Path, middle: Array) -> Array:
 
 
 def stages_of(simulation: Simulation) -> dict[str, float]:
-    """The time of each stage of a step, us, by MuJoCo's own timers."""
-    for data in simulation.stepped():
-        timers = data.timer
+    """The time of each stage of a step, us, by MuJoCo's own timers: medians, as other programs may interrupt a step."""
+    durations = np.array([data.timer.duration.copy() for data in simulation.stepped()])
+    steps = 1e6 * np.median(np.diff(durations, axis=0), axis=0)
 
     def taken(*names: str) -> float:
-        numbers = [int(getattr(mujoco.mjtTimer, f"mjTIMER_{name}")) for name in names]
-        return 1e6 * float(sum(timers[number].duration for number in numbers)) / simulation.steps
+        return float(sum(steps[int(getattr(mujoco.mjtTimer, f"mjTIMER_{name}"))] for name in names))
 
     stages, whole = {stage: taken(*names) for stage, names in TIMERS.items()}, taken("STEP")
     return stages | {"sensors and rest": whole - sum(stages.values()), "whole step": whole}
 
 
-def near(path: Path, touched: set[tuple[str, str]]) -> dict[tuple[str, str], float]:
-    """The pairs of geoms that came near and never touched, nearest first, and their least distances at samples, m."""
-    wide, data = mujoco.MjModel.__copy__(path.model), mujoco.MjData(path.model)
+def near(
+    model: mujoco.MjModel, positions: Array, touched: set[tuple[str, str]]
+) -> dict[tuple[str, str], float]:
+    """The pairs of geoms that came near and never touched, nearest first, and their least distances at positions, m."""
+    wide, data = mujoco.MjModel.__copy__(model), mujoco.MjData(model)
     pairs: dict[tuple[str, str], float] = {}
     wide.geom_margin += NEAR
-    for q in path.samples:
+    for q in positions:
         data.qpos[:] = q
         mujoco.mj_fwdPosition(wide, data)
         for numbers, distance in zip(np.sort(data.contact.geom, axis=1), data.contact.dist.tolist()):

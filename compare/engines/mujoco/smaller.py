@@ -1,8 +1,9 @@
 """A smaller file: what a motion does not use is taken out of an MjSpec, joints are locked, and it is written as MJCF."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path as File
+from shutil import copyfile
 from typing import Any
 
 import mujoco
@@ -58,15 +59,34 @@ class Smaller:
             self.spec.delete(element)
         return len(needless)
 
-    def text(self, comment: str = "") -> str:
-        """The file, by MuJoCo with six digits. Its meshes are read from the folders of the whole file."""
-        spec, folder = self.spec.copy(), File(self.spec.modelfiledir or ".").absolute()
+    def write(self, path: File, comment: str) -> None:
+        """Write the file, by MuJoCo with six digits; its meshes and height fields are copied into a folder beside it."""
+        spec, origin = self.spec.copy(), File(self.spec.modelfiledir or ".").absolute()
+        folder = assets_of(path)
+        for number, asset in enumerate(files_of(spec)):
+            name = File(asset.file).name
+            places = origin / spec.meshdir / asset.file, origin / spec.meshdir / name, origin / asset.file
+            folder.mkdir(exist_ok=True)
+            asset.name = asset.name or File(asset.file).stem
+            asset.file = f"{folder.name}/{number} {name}"
+            copyfile(next(filter(File.is_file, places), places[0]), path.parent / asset.file)
         spec.comment = comment.replace("--", "- -")  # which XML does not allow
-        spec.meshdir, spec.texturedir = str(folder / spec.meshdir), str(folder / spec.texturedir)
+        spec.modelfiledir, spec.meshdir, spec.strippath = str(path.absolute().parent), "", False
+        spec.texturedir = str(origin / spec.texturedir) if spec.textures else ""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             compiled(spec)
-            return str(spec.to_xml())
+            path.write_text(spec.to_xml(), encoding="utf-8")
+
+
+def files_of(spec: mujoco.MjSpec) -> list[mujoco.MjsMesh | mujoco.MjsHField]:
+    """The meshes and height fields that are read from files."""
+    return [asset for asset in (*spec.meshes, *spec.hfields) if asset.file]
+
+
+def assets_of(path: File) -> File:
+    """The folder of the meshes of a written file."""
+    return path.with_name(f"{path.stem}_assets")
 
 
 def drawing(small: Smaller, use: Use) -> int:
@@ -130,6 +150,14 @@ def stages(small: Smaller, use: Use) -> int:
     return bin(before[0] ^ option.disableflags).count("1") + bin(before[1] ^ option.enableflags).count("1")
 
 
+def islands(small: Smaller, use: Use) -> int:
+    """The division of constraints into islands, of which one alone gives the same bits."""
+    option, before = small.spec.option, small.spec.option.disableflags
+    if use.has_constraints:
+        option.disableflags |= bit("ISLAND")
+    return int(before != option.disableflags)
+
+
 def without(elements: str, is_needless: Callable[[Any, Use], bool]) -> "Edit":
     return lambda small, use: small.delete(elements, lambda element: is_needless(element, use))
 
@@ -148,6 +176,7 @@ FREE: dict[str, Edit] = {
     "tendons without force": tendons,
     "limits that never act": limits,
     "stages without work": stages,
+    "division into islands": islands,
 }
 
 
@@ -211,11 +240,15 @@ def of_parts(model: mujoco.MjModel, positions: Mapping[str, np.ndarray]) -> Posi
     return at
 
 
-def finished(small: Smaller, motion: Motion, dt: float, integrator: str) -> Smaller:
-    """With a step and an integrator, and the start of the motion as its only keyframe."""
-    spec, data = small.spec.copy(), motion.placed(small.model)
+def finished(small: Smaller, motions: Iterable[Motion], dt: float, integrator: str) -> Smaller:
+    """With a step and an integrator, and the starts of the motions as its only keyframes."""
+    spec = small.spec.copy()
     spec.option.timestep, spec.option.integrator = dt, INTEGRATORS[integrator]
     for key in list(spec.keys):
         spec.delete(key)
-    spec.add_key(name=motion.name, qpos=data.qpos, qvel=data.qvel, act=data.act, ctrl=data.ctrl)
+    for motion in motions:
+        data = motion.placed(small.model)
+        places = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()}
+        state = {"qpos": data.qpos, "qvel": data.qvel, "act": data.act, "ctrl": data.ctrl}
+        spec.add_key(name=motion.name, **state, **places)
     return Smaller(spec)

@@ -15,7 +15,15 @@ def copied(model: mujoco.MjModel) -> mujoco.MjModel:
 
 
 def has_free_base(model: mujoco.MjModel) -> bool:
-    return bool((model.jnt_type == mujoco.mjtJoint.mjJNT_FREE).any())
+    """Whether a base would fall: it has a free joint, or slides along gravity on a joint that nothing drives or stops."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    along = np.abs(data.xaxis @ model.opt.gravity) > 0.1 * np.linalg.norm(model.opt.gravity)
+    of_world = model.body_parentid[model.jnt_bodyid] == 0
+    slides = (model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE) & along & of_world
+    slides &= (model.jnt_stiffness == 0.0) & (model.jnt_limited == 0)
+    slides[model.actuator_trnid[model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT, 0]] = False
+    return bool((slides | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)).any())
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
@@ -112,10 +120,8 @@ def servo_bias(kp: float, kv: float | None, target: float) -> tuple[float, float
 
 def set_law(model: mujoco.MjModel, i: int, gain: tuple[float, ...], bias: tuple[float, ...]) -> None:
     """Give an actuator of a compiled model a law of constant gain, of three numbers each."""
-    model.actuator_gaintype[i], model.actuator_biastype[i] = (
-        mujoco.mjtGain.mjGAIN_FIXED,
-        mujoco.mjtBias.mjBIAS_AFFINE,
-    )
+    model.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
+    model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
     model.actuator_gainprm[i, :3], model.actuator_biasprm[i, :3] = gain, bias
 
 

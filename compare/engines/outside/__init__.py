@@ -29,7 +29,9 @@ from ...process.workers import Beginning, WorkerEnded, Workers
 from ...robots.case import Case
 from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Servos, Setting
 from . import answers
-from .model import EngineError, File, Reading, TooLong, passive
+from .bodies import passive
+from .file import EngineError, File, TooLong
+from .model import Reading
 
 T = TypeVar("T")
 
@@ -131,9 +133,9 @@ class OutsideDynamics(OneByOne):
             by[:, k] -= by[:, 2] @ (whole - part)
         return by
 
-    def seconds(self, quantity: str, *state: Array) -> float:
-        """Of one evaluation of a quantity at a state, in the engine's process."""
-        return self.ask(answers.seconds, quantity, *state)
+    def seconds_of_derivatives(self, *state: Array) -> float:
+        """Of one evaluation at a state, in the engine's process."""
+        return self.ask(answers.seconds_of_derivatives, *state)
 
     def has(self, quantity: str) -> bool:
         return quantity in self.reading["has"]
@@ -156,13 +158,11 @@ class OutsideDynamics(OneByOne):
         self.seconds_prepared, step_alone = self.ask(answers.prepared, course)
         alone = None if step_alone is None else step_alone * course.steps
 
-        def run() -> answers.Run:
+        def run() -> Motion:
             return self.ask(answers.ran, course)
 
-        def read(run: answers.Run) -> Motion:
-            motion, steps = course.motion(run.states, run.why), course.steps or None
-            motion = motion._replace(evaluations=run.evaluations, seconds=run.seconds, steps=steps)
-            return motion._replace(seconds_alone=alone)
+        def read(motion: Motion) -> Motion:
+            return motion._replace(steps=course.steps or None, seconds_alone=alone)
 
         return run, read
 

@@ -4,7 +4,7 @@ import importlib
 import time
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,20 +14,14 @@ from ...core import timing
 from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
-from .. import RECORDS, Array, Course
-from .model import EngineError, File, Numbers, ReadModel, Unread, numbers_of, size_of
+from .. import RECORDS, Array, Course, Motion
+from .bodies import numbers_of, size_of
+from .file import EngineError, File, Unread
+from .model import ReadModel
 
 CALLS = 50  # at most, that are timed
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
-QUANTITIES = "mass_matrix", "bias", "acceleration", "derivatives"
 T = TypeVar("T")
-
-
-class Run(NamedTuple):
-    states: Array  # (times, nq + nv)
-    evaluations: int | None
-    seconds: float  # of the run alone
-    why: str  # why it may have ended early
 
 
 def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, is_set: bool, *arguments: Any) -> T:
@@ -53,43 +47,47 @@ def read(name: str, file: File, tree: tmt.Tree, is_set: bool) -> ReadModel:
     model = kind(file, record.precision)
     model.stated = stated = numbers_of(tree)
     numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
+    differing = []
     for number, values in numbers.items():
-        if np.shape(values) != np.shape(stated[number]):
-            raise Unread(f"{number}: {len(values)} values, {len(stated[number])} in the compared model")
-    eps = FACTOR * record.eps
-    differing = [name for name in numbers if is_another(numbers[name], stated, name, eps)]
+        most = np.abs(values - stated[number]).max(initial=0.0)
+        if not most <= FACTOR * record.eps * size_of(stated, number):
+            differing.append(number)
     mended = {number: is_set and model.mend(number, stated[number]) for number in differing}
     unwritten = tuple(number for number in model.unwritten if mended.get(number))
     model.reading = {
         "read": numbers, "stated": stated, "copied": model.copied, "way": model.way, "unwritten": unwritten,
         "mended": {number: is_right for number, is_right in mended.items() if number not in unwritten},
         "lacking": tuple(number for number in model.drops if stated[number].any()),
-        "has": {quantity for quantity in QUANTITIES if gives(model, quantity)},
+        "has": set(model.quantities),
         "seconds": time.perf_counter() - begin,
     }  # fmt: skip
     return model
 
 
-def is_another(values: np.ndarray, stated: Numbers, number: str, eps: float) -> bool:
-    """Whether numbers that were read differ from those of the Tree by more than rounding."""
-    return not np.abs(values - stated[number]).max(initial=0.0) <= eps * size_of(stated, number)
-
-
-def gives(model: ReadModel, quantity: str) -> bool:
-    """Whether the class of a model computes a quantity, for this robot too."""
-    is_defined = getattr(type(model), quantity) is not getattr(ReadModel, quantity)
-    return is_defined and quantity not in model.lacks
-
-
 def each(model: ReadModel, quantity: str, *values: Array) -> Array:
-    """A quantity at many states, (states, ...)."""
-    return np.array([getattr(model, quantity)(*state) for state in zip(*values)], dtype=float)
+    """A quantity at many states of the Tree, (states, ...)."""
+    return np.array([value(model, quantity, *state) for state in zip(*values)], dtype=float)
 
 
-def seconds(model: ReadModel, quantity: str, *state: Array) -> float:
-    """Of one evaluation of a quantity at a state, the shortest."""
-    call = partial(getattr(model, quantity), *state)
-    return timing.fastest({quantity: call}, CALLS)[quantity]
+def value(
+    model: ReadModel, quantity: str, q: Array, v: Array | None = None, force: Array | None = None
+) -> Array:
+    at = model.order.state(q, v)
+    own_force = at.force(np.zeros_like(at.u) if force is None else force)
+    if quantity == "mass_matrix":
+        return at.S.T @ model.mass_matrix(at) @ at.S
+    if quantity == "bias":
+        return at.S.T @ model.bias(at)
+    if quantity == "acceleration":
+        return np.linalg.solve(at.S, model.acceleration(at, own_force) - at.c)
+    return np.array([at.S.T @ by @ at.S for by in model.derivatives(at, own_force)])  # S is a permutation
+
+
+def seconds_of_derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> float:
+    """Of one call of the engine, the shortest."""
+    at = model.order.state(q, v)
+    call = partial(model.derivatives, at, at.force(force))
+    return timing.fastest({"": call}, CALLS)[""]
 
 
 def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:
@@ -118,11 +116,12 @@ def batched(model: ReadModel, course: Course) -> tuple[float, float, str, np.nda
     return seconds, timing.fastest({"": run}, 5)[""], device, q
 
 
-def ran(model: ReadModel, course: Course) -> Run:
+def ran(model: ReadModel, course: Course) -> Motion:
     begin, why = time.perf_counter(), "a number is not finite"
     states, evaluations = course.start[None], None
     try:
         states, evaluations = model.run(course)
     except ArithmeticError as error:  # it cannot go on
         why = str(error)
-    return Run(np.asarray(states, float), evaluations, time.perf_counter() - begin, why)
+    motion = course.motion(np.asarray(states, float), why)
+    return motion._replace(evaluations=evaluations, seconds=time.perf_counter() - begin)

@@ -1,35 +1,32 @@
 """MJCF with all of its includes in one text, for engines that cannot read them or need names."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import compress
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Generic, NamedTuple, TypeVar
+from typing import TypeVar
 from xml.etree import ElementTree
 
 import numpy as np
 
 from ...core.errors import described
-from .model import OtherJoints, OtherNames, Unread
+from .file import OtherJoints, OtherNames, Unread
 
 Model = TypeVar("Model")
+Copied = tuple[Model, Path | str, tuple[str, str] | None]
 REFUSED = "Refused"  # the kind of an error that the engine raises
 FROM_FILES = "mesh", "hfield"  # of geoms
 # of a body in the compiled model
 FIELDS = {"pos": "ipos", "quat": "iquat", "mass": "mass", "diaginertia": "inertia"}
 
 
-class Copied(NamedTuple, Generic[Model]):
-    """What an engine has read."""
-
-    model: Model
-    source: Path | str  # the file, or the text of its copy
-    why: tuple[str, str] | None = None  # kind and message of the error about the file; None: it is no copy
-
-
 def original_or_copy(path: Path, read: Callable[[Path], Model]) -> Copied[Model]:
-    """What an engine reads of a file, or, if it raises, of a copy with `whole_text`; of a URDF there is none."""
+    """What an engine reads of a file, or, if it raises, of a copy with `whole_text`; of a URDF there is none.
+
+    The model; the file, or the text of its copy; kind and message of the error about the file, None: it is no copy.
+    """
     try:
-        return Copied(read(path), path)
+        return read(path), path, None
     except Exception as error:
         if path.suffix == ".urdf":
             raise
@@ -40,7 +37,7 @@ def original_or_copy(path: Path, read: Callable[[Path], Model]) -> Copied[Model]
     with TemporaryDirectory() as folder:
         copy = Path(folder) / path.name
         copy.write_text(text, encoding="utf-8")
-        return Copied(read(copy), text, (kind, " ".join(message.split())))
+        return read(copy), text, (kind, " ".join(message.split()))
 
 
 def whole_text(path: Path) -> str:
@@ -55,7 +52,7 @@ def whole_text(path: Path) -> str:
     root.attrib.setdefault("model", "robot")
     bodies = [body for world in root.findall("worldbody") for body in world.iter("body")]
     if root.find(".//mesh") is not None:
-        state_inertias(bodies, path)
+        take_meshes_away(bodies, path)
     for parent in list(root.iter()):
         for child in [child for child in parent if child.tag in FROM_FILES or is_from_file(child)]:
             parent.remove(child)
@@ -71,19 +68,35 @@ def is_from_file(part: ElementTree.Element) -> bool:
     return part.tag == "geom" and any(name in part.attrib for name in FROM_FILES)
 
 
-def state_inertias(bodies: list[ElementTree.Element], path: Path) -> None:
-    """Add the inertia that MuJoCo has computed to bodies with meshes and without one. It has vertices in float32."""
+def take_meshes_away(bodies: list[ElementTree.Element], path: Path) -> None:
+    """Remove geoms that are meshes, by their class too; their bodies get the inertia that MuJoCo has computed, in float32."""
     from ..mujoco.source import Source
 
-    model = Source(path).model
-    if model.nbody != len(bodies) + 1:
+    source = Source(path)
+    model, mesh_geoms = source.model, source.mesh_geoms
+    if not model.nbody - 1 == len(mesh_geoms) == len(bodies):
         raise Unread("its bodies are not all in the text")
-    for number, body in enumerate(bodies, start=1):
-        if any(map(is_from_file, body)) and body.find("inertial") is None:
+    for number, (body, (_, are_meshes)) in enumerate(zip(bodies, mesh_geoms), start=1):
+        geoms = list(geoms_in(body))
+        if len(geoms) != len(are_meshes):  # MuJoCo was asked without meshes whose files are missing
+            are_meshes = [is_from_file(geom) for _, geom in geoms]
+        meshes = list(compress(geoms, are_meshes))
+        for parent, geom in meshes:
+            parent.remove(geom)
+        if meshes and body.find("inertial") is None:
             inertial = ElementTree.SubElement(body, "inertial")
             for name, field in FIELDS.items():
                 values = np.ravel(getattr(model, f"body_{field}")[number]).tolist()
                 inertial.set(name, " ".join(map(repr, values)))
+
+
+def geoms_in(part: ElementTree.Element) -> Iterator[tuple[ElementTree.Element, ElementTree.Element]]:
+    """The geoms of a body with the elements around them: itself, or its frames."""
+    for child in part:
+        if child.tag == "geom":
+            yield part, child
+        elif child.tag == "frame":
+            yield from geoms_in(child)
 
 
 def included(element: ElementTree.Element, folder: Path) -> ElementTree.Element:

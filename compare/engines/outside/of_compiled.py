@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from functools import cache
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ...robots.actuators import Controller
 from .. import GRID, Array, Course
-from .model import FROM_COMPILED, File, Numbers, ReadModel, Unread
+from .bodies import Numbers
+from .file import File, Unread
+from .model import FROM_COMPILED, ReadModel
+from .order import Order
 
 if TYPE_CHECKING:
     from ..mujoco.handed_on import Bare
@@ -19,6 +24,8 @@ STAGES = {"Euler": 1, "implicitfast": 1, "implicit": 1, "discrete": 1, "RK4": 4}
 
 
 class OfCompiled(ReadModel):
+    """Coordinates are MuJoCo's, of the joints of the Tree in the order of the file."""
+
     way = FROM_COMPILED
     methods: ClassVar[tuple[str, ...]] = tuple(METHODS)
     rotors_in_joints: ClassVar[bool] = False  # the armature of actuators is that of their joints
@@ -31,6 +38,12 @@ class OfCompiled(ReadModel):
         self.driven = cache(self.made_driven)
         self.bare = self.made_bare(None)
         self.models = self.made_models(self.bare)
+        places = enumerate(self.bare.places.values())
+        self.order = Order(file, {k: (place.qpos.start, place.dofs.start) for k, place in places})
+        joints = self.bare.model.dof_jntid[self.bare.dofs]
+        # of `fields`: MuJoCo's names, and the indices of the Tree's speeds
+        self.where = {"armature": ("dof_armature", self.bare.dofs), "damping": ("dof_damping", self.bare.dofs),
+                      "stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}  # fmt: skip
 
     def made_bare(self, controller: Controller | None) -> Bare:
         """The model that the engine takes, whose actuators act if there is a controller."""
@@ -38,7 +51,10 @@ class OfCompiled(ReadModel):
         from ..mujoco.source import Source
 
         source = Source(self.file.path, self.file.floating)
-        return Bare(source, self.file.names, self.rotors_in_joints, controller)
+        bare = Bare(source, self.file.names, self.rotors_in_joints, controller)
+        for name, (index, values) in self.fields_set.items():
+            attrgetter(name)(bare.model)[index] = values
+        return bare
 
     def made_models(self, bare: Bare) -> dict[str, Any]:
         """The engine's models of it by the names of methods; Unread if it does not have what that needs."""
@@ -47,20 +63,18 @@ class OfCompiled(ReadModel):
         except NotImplementedError as error:
             raise Unread(f"it does not have what it needs: {error}") from None
 
+    @abstractmethod
     def put_model(self, model: Any) -> Any:
         """The engine's model of one of MuJoCo's."""
-        raise NotImplementedError
+
+    @abstractmethod
+    def held(self, name: str) -> Array:
+        """A field of the engine's models by MuJoCo's name of it."""
 
     def made_driven(self, key: tuple[float | None, ...]) -> tuple[Bare, dict[str, Any]]:
-        """Models in which the actuators act with these controls, with all that is set in the others."""
+        """Models in which the actuators act with these controls."""
         bare = self.made_bare(self.controllers[key])
-        return bare, self.with_all_fields(self.made_models(bare))
-
-    def with_all_fields(self, models: dict[str, Any]) -> dict[str, Any]:
-        """Models with all that is set in `models`."""
-        for name, place in self.fields_set.items():
-            models = {method: self.with_field(model, name, *place) for method, model in models.items()}
-        return models
+        return bare, self.made_models(bare)
 
     def of_course(self, course: Course) -> tuple[Bare, Any, Array]:
         """The models that a course needs: MuJoCo's, the engine's; and the torque that is applied beside its actuators, (nv,)."""
@@ -71,31 +85,33 @@ class OfCompiled(ReadModel):
         bare, models = self.driven(controller.controls)
         return bare, models[course.method], course.tau - controller.torque
 
-    def held(self, name: str) -> Array:
-        """A field of the engine's models by MuJoCo's name of it."""
-        raise NotImplementedError
+    def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
+        """q, and speeds or forces, (..., n), in MuJoCo's order of joints."""
+        placed = [np.zeros(np.shape(values), self.precision) for values in (q, *of_speeds)]
+        placed[0][..., self.bare.qpos] = q
+        for vector, values in zip(placed[1:], of_speeds):
+            vector[..., self.bare.dofs] = values
+        return placed
 
-    def gravity(self) -> Array:
-        raise NotImplementedError
+    def fields(self) -> Numbers:
+        return {name: self.held(field)[index] for name, (field, index) in self.where.items()}
 
-    def numbers(self) -> Numbers:
-        return {"gravity": self.gravity(), **self.bare.numbers(self.held)}
+    def set_field(self, name: str, values: Array) -> bool:
+        field, index = self.where[name]
+        self.fields_set[field] = index, values
+        self.bare = self.made_bare(None)
+        self.models = self.made_models(self.bare)
+        return True
 
-    def mend(self, name: str, values: Array) -> bool:
-        dofs, joints = self.bare.dofs, self.bare.model.dof_jntid[self.bare.dofs]
-        places = {"armature": ("dof_armature", dofs), "damping": ("dof_damping", dofs)}
-        places |= {"stiffness": ("jnt_stiffness", joints), "gravity": ("opt.gravity", np.arange(3))}
-        if name in places:
-            field, index = places[name]
-            self.fields_set[field] = index, values
-            self.models = {
-                kind: self.with_field(model, field, index, values) for kind, model in self.models.items()
-            }
-        return name in places
+    @abstractmethod
+    def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
+        """qpos and qvel at the times of a course after the first, (times, n). start: qpos, qvel, applied force."""
 
-    def with_field(self, model: Any, name: str, index: Array, values: Array) -> Any:
-        """One of the engine's models in which a field, by MuJoCo's name of it, has these values at indices."""
-        raise NotImplementedError
+    def run(self, course: Course) -> tuple[Array, int]:
+        bare, model, tau = self.of_course(course)
+        qpos, qvel = self.path(bare, model, self.placed(course.q, course.v, tau), course)
+        states = np.hstack([qpos[:, bare.qpos], qvel[:, bare.dofs]])
+        return np.vstack([course.start, states]), course.steps * STAGES[course.method]
 
     def prepare(self, course: Course) -> None:
         """Compile, by a run without steps."""

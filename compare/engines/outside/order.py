@@ -1,84 +1,164 @@
-"""Coordinates of an engine that are those of the Tree in another order, with a free body's speeds in part in other axes."""
+"""Coordinates of an engine beside those of the Tree: where joints begin, how rotations are stated, the axes of speeds.
 
-from collections.abc import Mapping, Sequence
+Of the Tree: quaternions w x y z; of a free joint the velocity of the body's origin in the world and the angular velocity in body
+axes. With S and c of a state, the engine's speeds are S v, its accelerations S a + c.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .. import Array
-from .model import File
+from tmt.derivation.coordinates import Joint
 
-Places = Sequence[int]
+from .. import Array
+from .file import File
+
 Starts = Mapping[int, tuple[int, int]]
 
 
-class Order(NamedTuple):
-    q: Array  # the place in the Tree's q of each of the engine's numbers
-    v: Array  # (nv,) the same in v
-    # of each free body, and of balls where that is so: speeds of the engine, the quaternion in the Tree's q
-    turned: tuple[tuple[slice, slice], ...]
-    # those speeds are in world axes where the Tree's are in body axes; False: the other way round
-    in_world: bool
-    nq: int  # of the Tree
+class Code(NamedTuple):
+    """How an engine states the position of a joint."""
 
-    def engine(self, q: Array, *vectors: Array) -> list[Array]:
-        """q, and vectors of speeds or forces at q, of the Tree as the engine has them."""
-        placed = [vector[self.v] for vector in vectors]
-        for at, place in self.turned:
-            turn = self.turn(q[place])
-            for vector in placed:
-                vector[at] = turn @ vector[at]
-        return [q[self.q], *placed]
+    size: int  # numbers of the engine
+    encode: Callable[[Array], Array]  # from the Tree's numbers
+    decode: Callable[[Array], Array]
 
-    def tree(self, q: Array, vector: Array) -> Array:
-        """A vector of the engine, (nv,), or vectors as columns, at q of the Tree, as the Tree has it."""
-        placed = np.empty_like(vector)
-        placed[self.v] = vector
-        for at, place in self.turned:
-            placed[self.v[at]] = self.turn(q[place]).T @ vector[at]
+
+def quaternion(turn: Rotation) -> Array:
+    return np.roll(turn.as_quat(), 1)
+
+
+def rotation(wxyz: Array) -> Rotation:
+    return Rotation.from_quat(np.roll(wxyz, -1))
+
+
+def unit(wxyz: Array) -> Array:
+    return wxyz / np.linalg.norm(wxyz)
+
+
+NUMBER = Code(1, np.array, np.array)
+CIRCLE = Code(2, lambda q: np.r_[np.cos(q), np.sin(q)], lambda x: np.arctan2(x[1:], x[:1]))
+WXYZ = Code(4, np.array, unit)
+XYZW = Code(4, lambda q: np.roll(q, -1), lambda x: unit(np.roll(x, 1)))
+VECTOR = Code(3, lambda q: rotation(q).as_rotvec(), lambda x: quaternion(Rotation.from_rotvec(x)))
+ANGLES = Code(3, lambda q: rotation(q).as_euler("xyz"), lambda x: quaternion(Rotation.from_euler("xyz", x)))
+
+
+class State(NamedTuple):
+    """A state of the Tree in an engine's coordinates."""
+
+    x: Array  # positions of the engine
+    u: Array  # its speeds
+    S: Array  # (nv, nv)
+    c: Array  # (nv,)
+
+    def force(self, force: Array) -> Array:
+        """Generalized forces of the Tree as the engine has them."""
+        return np.asarray(np.linalg.solve(self.S.T, force))
+
+
+def of_free(ball: int, linear: tuple[int, int], rotation: tuple[int, int]) -> Starts:
+    """Where the joints of a free joint begin, by the number of its ball: (q, v) of its slides and of the ball."""
+    slides = {ball - 3 + i: (linear[0] + i, linear[1] + i) for i in range(3)}
+    return slides | {ball: rotation}
+
+
+@dataclass(frozen=True)
+class Order:
+    """The coordinates of an engine. starts: where its q and v of each joint of the Tree begin, by the number of the joint."""
+
+    file: File
+    starts: Starts
+    free: Code = WXYZ  # the rotation of a free joint
+    ball: Code = WXYZ
+    linear_in_world: bool = True  # the speeds of a free joint
+    angular_in_world: bool = False
+    balls_in_parent: bool = False  # a ball's angular velocity is in the axes of the body that carries it
+    circles: tuple[int, ...] = ()  # joints whose angle is stated by its cosine and sine
+    # (nq,): the Tree's positions where those of hinges and slides are 0 in the engine
+    reference: Array | float = 0.0
+    # of free joints, by the number of the ball: the point of the body whose velocity the engine has
+    points: Mapping[int, Array] = field(default_factory=dict)
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        return self.file.coordinates.places.joints
+
+    @cached_property
+    def parts(self) -> list[tuple[slice, slice, Code]]:
+        """The numbers of positions in the Tree, those in the engine, and how these are stated."""
+        codes = [CIRCLE if k in self.circles else NUMBER for k in range(len(self.joints))]
+        parts = []
+        for k, (start, _) in self.starts.items():
+            if self.joints[k].kind == "ball":
+                codes[k] = self.free if self.file.is_free(k) else self.ball
+            parts.append((self.joints[k].q, slice(start, start + codes[k].size), codes[k]))
+        return parts
+
+    @cached_property
+    def v(self) -> Array:
+        """The place in the Tree's v of each of the engine's speeds, (nv,)."""
+        places = np.empty(self.file.coordinates.nv, int)
+        for k, (_, start) in self.starts.items():
+            speeds = self.joints[k].speeds
+            places[start : start + len(speeds)] = speeds
+        return places
+
+    def is_of_free(self) -> Array:
+        """Whether a speed of the Tree is that of a free joint, (nv,)."""
+        free = np.zeros(self.file.coordinates.nv, bool)
+        for k, joint in enumerate(self.joints):
+            if self.file.is_free(k):
+                free[joint.qd.start - 3 : joint.qd.stop] = True
+        return free
+
+    def engine_positions(self, q: Array) -> Array:
+        x, moved = np.empty(max(part.stop for _, part, _ in self.parts)), q - self.reference
+        for place, part, code in self.parts:
+            x[part] = code.encode(moved[place])
+        return x
+
+    def tree_state(self, x: Array, u: Array) -> tuple[Array, Array]:
+        """q and v of the Tree."""
+        q = np.empty(self.file.coordinates.nq)
+        for place, part, code in self.parts:
+            q[place] = code.decode(x[part])
+        q += self.reference
+        return q, np.linalg.solve(self.state(q).S, u)
+
+    def tree_numbers(self, values: Array) -> Array:
+        """Numbers of the engine's speeds, (nv,) or (nv, nv), in the Tree's order; axes are left as they are."""
+        placed = np.empty_like(values)
+        placed[np.ix_(*[self.v] * values.ndim)] = values
         return placed
 
-    def turn(self, quaternion: Array) -> Array:
-        """The rotation (3, 3) from the Tree's axes to the engine's."""
-        turn = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
-        return turn if self.in_world else turn.T
-
-    def positions(self, q: Array) -> Array:
-        """Positions of the engine in the Tree's order, quaternions of length 1."""
-        placed = np.ones(self.nq)
-        placed[self.q] = q
-        for _, place in self.turned:
-            placed[place] /= np.linalg.norm(placed[place])
-        return placed
-
-    def tree_matrix(self, q: Array, matrix: Array) -> Array:
-        return self.tree(q, self.tree(q, matrix).T)
-
-
-def order_of(
-    file: File, starts: Starts, free_q: Places, free_v: Places, in_world: bool, ball_q: Places = (0, 1, 2, 3),
-    turned_balls: bool = False, turned_at: int = 0,
-) -> Order:  # fmt: skip
-    """The order of an engine.
-
-    starts: where the engine's q and v of a joint begin, by its number in the Tree, of a free joint by that of its ball; free_q,
-    free_v, ball_q: of a free joint and of a ball, the Tree's numbers in the engine's order; turned_balls: a ball's speeds are
-    in the axes of the body that carries it; turned_at: the first of a free joint's speeds that are in other axes.
-    """
-    q: dict[int, int] = {}
-    v: dict[int, int] = {}
-    turned = []
-    for k, (start_q, start_v) in starts.items():
-        joint = file.coordinates.places.joints[k]
-        of_q, of_v = np.r_[joint.q], np.r_[joint.qd]
-        if file.is_free(k):
-            turned.append((slice(start_v + turned_at, start_v + turned_at + 3), joint.q))
-            of_q, of_v = of_q[0] - 3 + np.array(free_q), of_v[0] - 3 + np.array(free_v)
-        elif joint.kind == "ball":
-            of_q = of_q[list(ball_q)]
-            turned += [(slice(start_v, start_v + 3), joint.q)] * turned_balls
-        q |= enumerate(of_q, start_q)
-        v |= enumerate(of_v, start_v)
-    in_q, in_v = (np.array([place for _, place in sorted(places.items())], int) for places in (q, v))
-    return Order(in_q, in_v, tuple(turned), in_world, file.coordinates.nq)
+    def state(self, q: Array, v: Array | None = None) -> State:
+        """A state; at rest by default."""
+        v = np.zeros(self.file.coordinates.nv) if v is None else v
+        S, c = np.zeros((len(self.v),) * 2), np.zeros(len(self.v))
+        S[np.arange(len(self.v)), self.v] = 1.0
+        for k, (_, start) in self.starts.items():
+            joint, rows = self.joints[k], slice(start, start + 3)
+            if joint.kind != "ball":
+                continue
+            R = rotation(q[joint.q]).as_matrix()
+            is_free = self.file.is_free(k)
+            is_turned = self.angular_in_world if is_free else self.balls_in_parent
+            S[rows, joint.qd] = R if is_turned else np.eye(3)
+            if not is_free:
+                continue
+            first = self.starts[k - 3][1]
+            linear, of_origin = slice(first, first + 3), slice(joint.qd.start - 3, joint.qd.start)
+            in_linear = np.eye(3) if self.linear_in_world else R.T
+            point = R @ self.points.get(k, np.zeros(3))
+            S[linear, of_origin] = in_linear
+            S[linear, joint.qd] = in_linear @ np.cross(R, point[:, None], axis=0)
+            w = R @ v[joint.qd]
+            c[linear] = in_linear @ np.cross(w, np.cross(w, point))
+            if not self.linear_in_world:  # the axes turn
+                c[linear] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
+        return State(self.engine_positions(q), S @ v, S, c)

@@ -17,7 +17,7 @@ from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
 from ...engines.outside import OutsideDynamics
-from ...engines.outside.model import EngineError
+from ...engines.outside.file import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...stability.closed_form import COVERED, matrix
@@ -71,10 +71,13 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     add_times(setup, result, main)
     if setup.alone:
         add_engines(setup, result, main[0])
-        add_contacts(setup, result)
     scenes = [row for measured in every if measured.subject.kind == "scene" for row in measured.rows]
     add_costs(result, scenes, main)
-    add_advice(result, scenes, [measured for measured in every if measured.subject.kind != "scene"])
+    hard = [measured for measured in every if measured.subject.kind != "scene"]
+    in_air = any(feature.feature == "contact" for feature in setup.robot.features)
+    add_advice(result, scenes, hard, in_air)
+    if setup.alone and in_air:
+        add_contacts(setup, result)
     return result
 
 
@@ -115,7 +118,7 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
         forward.rows.append(row)
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]
-        result.times[quantity.name, LABELS[name]] = dynamics.seconds("derivatives", *state)
+        result.times[quantity.name, LABELS[name]] = dynamics.seconds_of_derivatives(*state)
 
 
 def has_derivatives(dynamics: OutsideDynamics) -> bool:
@@ -128,12 +131,10 @@ def has_derivatives(dynamics: OutsideDynamics) -> bool:
 
 def add_contacts(setup: Setup, result: DerivativesResult) -> None:
     """What differences are worth where a robot of a file stands on its contacts."""
-    if setup.reading is None or all(feature.feature != "contact" for feature in setup.reading.features):
-        return
     setup.progress("derivatives: contacts")
-    if rows := contact_rows(setup.reading):
+    if setup.reading and (rows := contact_rows(setup.reading)):
         result.tables["contact_derivatives"] = rows
-        result.find("contacts", rows=rows)
+        result.top.append(result.finding("contacts", rows=rows))
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:
@@ -171,12 +172,9 @@ def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: 
     costs: list[CostRow] = []
     for quantity, way in dict.fromkeys((row.quantity, row.way) for measured in main for row in measured.rows):
         same = [row for row in scenes if (row.quantity, row.way) == (quantity, way)]
-        best, usual = ways.best_of(same), ways.worst_of_each_eps(same).get(ways.USUAL)
-        seconds = result.times.get((quantity, way))
-        costs.append(CostRow(
-            quantity=quantity, way=way, best_eps=best.eps, error=best.error,
-            error_at_usual=usual.error if usual else None, time=None if seconds is None else 1e6 * seconds,
-        ))  # fmt: skip
+        best, seconds = ways.best_of(same), result.times.get((quantity, way))
+        time = None if seconds is None else 1e6 * seconds
+        costs.append(CostRow(quantity=quantity, way=way, best_eps=best.eps, error=best.error, time=time))
     result.tables["derivative_costs"] = costs
     timed = [row for row in costs if row.time]
     pairs = [(row, of_mujoco(timed, row.quantity)) for row in timed if row.way == ways.COMPILED]
@@ -196,8 +194,10 @@ def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
     )
 
 
-def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured]) -> None:
-    """Which eps to use, what it costs, and where that fails."""
+def add_advice(
+    result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured], in_air: bool
+) -> None:
+    """Which eps to use, what it costs, and where that fails. in_air: contacts are left out."""
     by_eps = [row for row in scenes if row.eps]
     one_sided = [row for row in by_eps if row.way.endswith(ways.ONE_SIDED)]
     values: dict[str, Any] = {
@@ -206,6 +206,7 @@ def add_advice(result: DerivativesResult, scenes: Sequence[DerivativeRow], hard:
         "usual": ways.worst_of_each_eps(one_sided)[ways.USUAL],
         "inverse": ways.best_of(row for row in by_eps if row.quantity == ways.INVERSE),
         "exact": ways.best_of(row for row in scenes if row.way in EXACT),
+        "in_air": in_air,
     }
     result.headline = result.finding("headline", centred=values["centred"])
     result.top.append(result.finding("advice", **values))

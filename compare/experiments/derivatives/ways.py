@@ -67,7 +67,6 @@ class CostRow(Row):
     way: str
     best_eps: float | None
     error: float | None  # with that
-    error_at_usual: float | None  # with USUAL, 1e-6
     time: float | None = column("us")
 
 

@@ -13,16 +13,8 @@ from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
-from ...engines.outside.model import (
-    FROM_URDF,
-    EngineError,
-    OtherJoints,
-    OtherNames,
-    TooLong,
-    Unasked,
-    Unread,
-    Unwritten,
-)
+from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unread, Unwritten
+from ...engines.outside.model import FROM_URDF
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
@@ -40,16 +32,8 @@ EXPERIMENT = Experiment(order=65, serves_own=False, quick_speeds=0, options=("--
 BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
 TABLES = "answer", "read", "methods", "servos", "batches"
-SHOWN = ["engine", "quantity", "unit", "states", "as_read_over_bar", "worst_difference", "bar", "difference_over_bar",
-         "difference_eps", "mujoco_eps"]  # fmt: skip
-NOT_ASKED = (
-    Unread,
-    OtherJoints,
-    OtherNames,
-    Unasked,
-    Unwritten,
-    TooLong,
-)  # their names are kinds in the template
+# their names are kinds in the template
+NOT_ASKED = Unread, OtherJoints, OtherNames, Unwritten, TooLong
 
 
 def skipped(robot: Robot) -> Finding | None:
@@ -60,7 +44,7 @@ def skipped(robot: Robot) -> Finding | None:
 
 def rows(setup: Setup) -> EnginesResult:
     """What each installed engine has read, its M, h and accelerations, its integrators, servos and batches."""
-    result = EnginesResult("engines", shown=SHOWN, tables={f"engines_{name}": [] for name in TABLES})
+    result = EnginesResult("engines", tables={f"engines_{name}": [] for name in TABLES})
     absent: dict[str, list[str]] = {}
     others = [engine for engine in setup.engines.values() if isinstance(engine, Outside)]
     for engine in others:
@@ -133,9 +117,14 @@ def compare_quantities(
         if not dynamics.has(function):
             result.find("no_function", engine=record.label, quantity=name)
             continue
-        several = {"set": dynamics, "read": as_read or dynamics, "mujoco": mujoco}
         states = QUANTITIES[name].states(sample)
-        values = {which: getattr(asked, function)(*states) for which, asked in several.items()}
+        values = {"set": getattr(dynamics, function)(*states), "mujoco": getattr(mujoco, function)(*states)}
+        try:
+            values["read"] = getattr(as_read, function)(*states) if as_read else values["set"]
+        except EngineError as error:  # with what it has read it may have no solution
+            what = f"{name} of {record.label}, as read"
+            result.find("left_out", what=what, reason=str(error).rstrip("."))
+            values["read"] = np.full_like(values["set"], np.inf)
         compare_quantity(result, sample, record, name, values)
 
 
@@ -155,13 +144,12 @@ def compare_quantity(
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
     unit, pair = quantity.unit(sample.tree), (distances["set"][worst], tolerance[worst])
     check = result.check(record.label, f"{name} to exact", *pair, unit, note, True, about=About.ENGINE)
-    state = {f"worst_{name}": " ".join(of_state) for name, of_state in numbers.items()}
     result.rows.append(EngineRow(
         engine=record.label, precision=record.precision, quantity=name, unit=unit, states=len(sample.q),
         as_read_over_bar=float(over(distances["read"], tolerance).max()), worst_difference=check.value,
         bar=check.tolerance, difference_over_bar=check.over_tolerance,
         difference_eps=float(over(distances["set"], eps * size).max()),
-        mujoco_eps=float(over(distances["mujoco"], EPS * size).max()), **state, passed=check.passed,
+        mujoco_eps=float(over(distances["mujoco"], EPS * size).max()), passed=check.passed,
     ))  # fmt: skip
 
 
@@ -178,7 +166,7 @@ def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:
 
     has_errors = any(row.worst_error for row in result.tables["engines_methods"])
     drawings = {
-        drawn.draw_distances: result.rows, drawn.draw_errors: has_errors,
+        drawn.draw_errors: has_errors,
         drawn.draw_servos: result.tables["engines_servos"], drawn.draw_batches: result.tables["engines_batches"],
     }  # fmt: skip
     yield from (partial(draw, result) for draw, is_drawn in drawings.items() if is_drawn)

@@ -12,7 +12,7 @@ from ...core import timing
 from ...engines import LABELS, RECORDS, Array, Engine
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.outside import OutsideDynamics
-from ...engines.outside.model import EngineError
+from ...engines.outside.file import EngineError
 from ...robots.case import Case
 from ..setup import Setup
 from .motion import free_scene
@@ -51,8 +51,9 @@ def add_row(result: EnginesResult, case: Case, engine: Engine, worlds: int) -> f
     if isinstance(dynamics, OutsideDynamics):
         prepared, seconds, device, end = dynamics.batch((q, v, tau), dt, STEPS, method)
     else:
-        run = runner(dynamics, (q, v, tau), dt, method) if isinstance(dynamics, MujocoDynamics) else None
-        run = run or partial(dynamics.run, q, v, tau, dt, STEPS, method)
+        run: Callable[[], object] = partial(dynamics.run, q, v, tau, dt, STEPS, method)
+        if isinstance(dynamics, MujocoDynamics):  # its loop over the worlds in C, on all cores
+            _, run = dynamics.runner((q, v, tau), dt, STEPS, method, None, threads=cores())
         seconds = timing.fastest({"": run}, 5)[""]
         end = dynamics.run(q[:1], v[:1], tau[:1], dt, STEPS, method).q[0, -1]
     error = float(np.abs(case.coordinates.difference(end, exact(case, dt))).max())
@@ -62,13 +63,6 @@ def add_row(result: EnginesResult, case: Case, engine: Engine, worlds: int) -> f
         per_step_and_world=cost, seconds_prepared=prepared,
     ))  # fmt: skip
     return seconds
-
-
-def runner(
-    dynamics: MujocoDynamics, start: tuple[Array, Array, Array], dt: float, method: str
-) -> Callable[[], object]:
-    """MuJoCo's C loop over the worlds, on all cores."""
-    return dynamics.runner(start, dt, STEPS, method, None, threads=cores())[1]
 
 
 def exact(case: Case, dt: float) -> Array:

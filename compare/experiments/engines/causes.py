@@ -4,21 +4,24 @@ A cause is named only where the file has the fact at that joint or body, and the
 has a script that shows it in tests/engines/test_accusations.py.
 """
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ...core.words import some_of
+from ...engines.mujoco.names import joint_places
 from ...engines.mujoco.source import Source
+from ...engines.outside.file import File
 from ...engines.outside.mjcf_text import included
 from ...engines.outside.model import Reading
 
 OF_JOINTS = "armature", "damping", "stiffness", "axis"
 PLACES = "com", "com_moved", "inertia", "anchor", "anchor_moved", "axis", "axis_moved"
 MASSES = "mass", "moments", "com", "com_moved", "inertia"
+CLOSE = 1e-6  # m
 STANDARD = (0.0, 0.0, -9.81)
 
 
@@ -33,8 +36,11 @@ class Cause(NamedTuple):
 class Text:
     """An MJCF file as text: elements by their names, the classes of defaults; and its compiled model."""
 
-    def __init__(self, path: Path) -> None:
-        self.model = Source(path).model
+    def __init__(self, file: File) -> None:
+        source, path = Source(file.path, file.floating), file.path
+        self.model = source.model
+        self.meshed = {name for name, are_meshes in source.mesh_geoms if any(are_meshes)}  # of bodies
+        self.places = joint_places(self.model)
         self.root = ElementTree.Element("mujoco")
         if path.suffix != ".urdf":
             self.root = included(ElementTree.parse(path).getroot(), path.parent)
@@ -71,12 +77,9 @@ class Text:
             empty, name = name if stated is None else empty, around
         return None
 
-    def carriers(self, name: str, is_joint: bool) -> list[int]:
-        """The bodies from the one of a name, or that of a joint of that name, to the last one before the world."""
-        bodies = {self.model.body(k).name: k for k in range(self.model.nbody)}
-        joints = {self.model.joint(k).name: int(self.model.jnt_bodyid[k]) for k in range(self.model.njnt)}
-        body = joints[name] if is_joint and name in joints else bodies.get(name, 0)
-        carriers = []
+    def carriers(self, joint: str) -> list[int]:
+        """The bodies from that of a joint of the Tree to the last one before the world."""
+        body, carriers = int(self.model.jnt_bodyid[self.places[joint].joint]), []
         while body:
             carriers.append(body)
             body = int(self.model.body_parentid[body])
@@ -93,35 +96,39 @@ class Entry(NamedTuple):
     text: Text
     reading: Reading
     number: str
-    name: str  # of a body or joint
-    joint: int  # of the Tree, to whose row it belongs
+    joints: Sequence[str]  # of the Tree
+    joint: int  # to whose row it belongs
+    bodies: Sequence[str]  # that move with that joint
     place: int  # in all numbers as one row
-    wrong: set[str]  # the names of all entries of this number that differ
+    wrong: set[int]  # the joints of all entries of this number that differ
 
     def values(self, number: str) -> tuple[np.ndarray, np.ndarray]:
         """What was read, and what is stated."""
         return self.reading["read"][number], self.reading["stated"][number]
 
     @property
-    def is_zero(self) -> bool:
-        return not self.values(self.number)[0][self.place]
+    def name(self) -> str:
+        """Of the joint."""
+        return self.joints[self.joint]
 
-    def carriers(self, name: str) -> list[int]:
-        """The bodies from that of a name among the entries to the last one before the world."""
-        return self.text.carriers(name, self.number.startswith(("axis", "anchor")))
+    @property
+    def is_zero(self) -> bool:
+        return not np.ravel(self.values(self.number)[0])[self.place]
 
     @property
     def root(self) -> int:
         """The last body before the world, for an entry of a place; 0: none."""
-        return next(reversed(self.carriers(self.name)), 0) if self.number in PLACES else 0
+        return self.text.carriers(self.name)[-1] if self.number in PLACES else 0
 
     @property
     def geoms(self) -> list[ElementTree.Element]:
-        """The geoms of which the body has its mass, for an entry of masses."""
-        body = self.text.root.find(f".//body[@name='{self.name}']")
-        if self.number not in MASSES or body is None or body.find("inertial") is not None:
-            return []
-        return body.findall("geom")
+        """The geoms of which the bodies have their mass, for an entry of masses."""
+        geoms: list[ElementTree.Element] = []
+        for name in self.bodies if self.number in MASSES else ():
+            body = self.text.root.find(f".//body[@name='{name}']")
+            if body is not None and body.find("inertial") is None:
+                geoms += body.findall("geom")
+        return geoms
 
 
 def class_without_joint(entry: Entry) -> str | None:
@@ -129,9 +136,9 @@ def class_without_joint(entry: Entry) -> str | None:
     name = entry.text.passed_over(entry.name, entry.number) if entry.number in OF_JOINTS else None
     if name and entry.number == "axis":
         z = np.array([0.0, 0.0, 1.0])
-        for body in entry.carriers(entry.name):
+        for body in entry.text.carriers(entry.name):
             z = entry.text.turn(body).apply(z)
-        return name if np.allclose(entry.values("axis")[0][entry.joint], z, atol=1e-6) else None
+        return name if np.allclose(entry.values("axis")[0][entry.joint], z, atol=CLOSE) else None
     return name if name and entry.is_zero else None
 
 
@@ -142,7 +149,7 @@ def no_springs(entry: Entry) -> str | None:
 
 def armature_without_motor(entry: Entry) -> str | None:
     """The engine has the armature of all joints that a motor or a position servo drives, and of no other."""
-    driven = entry.wrong & entry.text.driven
+    driven = {entry.joints[joint] for joint in entry.wrong} & entry.text.driven
     unexplained = [name for name in driven if not entry.text.passed_over(name, "armature")]
     is_lost = entry.number == "armature" and entry.is_zero and entry.name not in driven
     return entry.name if is_lost and not unexplained else None
@@ -150,7 +157,7 @@ def armature_without_motor(entry: Entry) -> str | None:
 
 def option_gravity(entry: Entry) -> str | None:
     is_gravity = entry.number == "gravity"
-    return "gravity" if is_gravity and np.allclose(entry.values("gravity")[0], STANDARD, atol=1e-6) else None
+    return "gravity" if is_gravity and np.allclose(entry.values("gravity")[0], STANDARD, atol=CLOSE) else None
 
 
 def total_mass(entry: Entry) -> str | None:
@@ -163,7 +170,8 @@ def total_mass(entry: Entry) -> str | None:
 
 
 def mass_of_meshes(entry: Entry) -> str | None:
-    return entry.name if any("mesh" in geom.attrib for geom in entry.geoms) else None
+    meshed = [name for name in entry.bodies if name in entry.text.meshed]
+    return some_of(meshed) if entry.geoms and meshed else None
 
 
 def mass_without_contacts(entry: Entry) -> str | None:
@@ -171,10 +179,10 @@ def mass_without_contacts(entry: Entry) -> str | None:
     if not entry.geoms:
         return None
     model, (read, stated) = entry.text.model, entry.values("mass")
-    geoms = model.geom_bodyid == model.body(entry.name).id
+    geoms = np.isin(model.geom_bodyid, [model.body(name).id for name in entry.bodies])
     touches = model.geom_contype[geoms] | model.geom_conaffinity[geoms]  # of those that are not only drawn
     all_touch = touches.size and touches.all()
-    return entry.name if read[entry.joint] < stated[entry.joint] and not all_touch else None
+    return some_of(entry.bodies) if read[entry.joint] < stated[entry.joint] and not all_touch else None
 
 
 def small_inertia(entry: Entry) -> str | None:
@@ -182,22 +190,33 @@ def small_inertia(entry: Entry) -> str | None:
     if entry.number != "moments" or "mass" in entry.reading["mended"]:
         return None
     read, stated = entry.values("moments")
-    return entry.name if (read >= stated * (1.0 - 1e-5)).all() else None
+    return some_of(entry.bodies) if (read >= stated * (1.0 - 1e-5)).all() else None
 
 
 def mass_of_geoms(entry: Entry) -> str | None:
-    return entry.name if entry.geoms else None
+    return some_of(entry.bodies) if entry.geoms else None
+
+
+def is_displaced(entry: Entry, turn: Rotation, shift: np.ndarray) -> bool:
+    """Whether turn and shift lead from where the engine has a joint to where it is stated, or of one without an axis its body."""
+    (axis, stated_axis), (anchor, stated) = entry.values("axis"), entry.values("anchor")
+    joint = entry.joint
+    if not stated_axis[joint].any():
+        com, stated = entry.values("com")
+        return bool(np.allclose(turn.apply(com[joint]) + shift, stated[joint], atol=CLOSE))
+    beside = (turn.apply(anchor[joint]) + shift - stated[joint]) * stated[joint].any()  # 0 for a slide
+    is_on_line = np.allclose(np.cross(beside, stated_axis[joint]), 0.0, atol=CLOSE)
+    return bool(is_on_line and np.allclose(turn.apply(axis[joint]), stated_axis[joint], atol=CLOSE))
 
 
 def fixed_root(entry: Entry) -> str | None:
     """Without the pose of a body on the world that has no joint, all is where the engine has it."""
     model, root = entry.text.model, entry.root
-    has_pose = model.body_pos[root].any() or model.body_quat[root][1:].any()
-    if not root or model.body_jntnum[root] or not has_pose:
+    if not root or model.body_jntnum[root]:
         return None
-    read, stated = entry.values("com")
-    placed = entry.text.turn(root).apply(read[entry.joint]) + model.body_pos[root]
-    return str(model.body(root).name) if np.allclose(placed, stated[entry.joint], atol=1e-6) else None
+    shift, turn = model.body_pos[root], entry.text.turn(root)
+    has_pose = shift.any() or turn.magnitude()
+    return str(model.body(root).name) if has_pose and is_displaced(entry, turn, shift) else None
 
 
 def turned_start(entry: Entry) -> str | None:
@@ -205,21 +224,20 @@ def turned_start(entry: Entry) -> str | None:
     model, root = entry.text.model, entry.root
     if not root or model.body_dofnum[root] != 6:
         return None
-    read, stated = entry.values("com")
-    moved = model.body_pos[root] - entry.text.turn(root).apply(model.body_pos[root])
-    is_so = moved.any() and np.allclose(stated[entry.joint] + moved, read[entry.joint], atol=1e-6)
+    turn, shift = entry.text.turn(root), model.body_pos[root]
+    is_so = turn.magnitude() and is_displaced(entry, Rotation.identity(), turn.apply(shift) - shift)
     return str(model.body(root).name) if is_so else None
 
 
 def several_joints(entry: Entry) -> str | None:
     """All that is at another place is carried by a body with several joints."""
-    model = entry.text.model
-    several = {
-        name: [body for body in entry.carriers(name) if model.body_jntnum[body] > 1] for name in entry.wrong
-    }
+    model, several = entry.text.model, {}
+    for joint in entry.wrong:
+        bodies = entry.text.carriers(entry.joints[joint])
+        several[joint] = [body for body in bodies if model.body_jntnum[body] > 1]
     if entry.number not in PLACES or not all(several.values()):
         return None
-    return str(model.body(several[entry.name][0]).name)
+    return str(model.body(several[entry.joint][0]).name)
 
 
 CAUSES: tuple[Callable[[Entry], str | None], ...] = (

@@ -1,4 +1,4 @@
-"""Figures of other engines: distances from the exact values; errors, times, responses of servos, batches."""
+"""Figures of other engines: errors, times, responses of servos, batches."""
 
 from itertools import cycle
 from typing import Any
@@ -11,36 +11,13 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from ...core.check import Result
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
-from ...judge.scale import FACTOR
 from ...report import style
-from ...report.style import RED, WIDTH
+from ...report.style import WIDTH
 from .tables import EnginesResult
 
 DASHES = (*style.DASHES, (0, (1, 3)), (0, (8, 2)), (0, (6, 1, 1, 1, 1, 1)))
 OF_METHODS = "os^DvPX<>*hp"  # markers of the methods of one engine
 LOOKS: dict[str, Any] = {LABELS[name]: {"marker": MARKS[name], "color": COLOURS[name]} for name in LABELS}
-
-
-def draw_distances(result: Result) -> tuple[str, Figure, Finding]:
-    """The largest distance from the exact values, in eps of each engine's precision, for each quantity."""
-    names = [*dict.fromkeys(row.engine for row in result.rows), LABELS["mujoco"]]
-    quantities = list(dict.fromkeys(row.quantity for row in result.rows))
-    fig = Figure(figsize=(WIDTH, 1.0 + 0.32 * len(names)), layout="constrained")
-    axes = fig.subplots(1, len(quantities), sharey=True, sharex=True, squeeze=False)[0]
-    for ax, quantity in zip(axes, quantities):
-        rows = [row for row in result.rows if row.quantity == quantity]
-        distances = {row.engine: row.difference_eps for row in rows}
-        distances[LABELS["mujoco"]] = max(row.mujoco_eps for row in rows)
-        for name, distance in distances.items():
-            ax.plot(distance, names.index(name), **LOOKS[name])
-        ax.axvline(FACTOR, color=RED, linewidth=2, label=f"tolerance, {FACTOR} eps")
-        ax.set(title=quantity, xscale="log", ylim=(len(names) - 0.4, -0.6))
-        ax.set_yticks(range(len(names)), names)
-    label = "largest distance from the exact value, eps of the engine × scale of the quantity"
-    fig.supxlabel(label, fontsize=9)
-    fig.legend(*ax.get_legend_handles_labels(), loc="outside upper center")
-    most = max(result.rows, key=lambda row: row.difference_eps)
-    return "engines_distances", fig, result.finding("distances", most=most)
 
 
 def draw_errors(result: Result) -> tuple[str, Figure, Finding]:

@@ -9,7 +9,7 @@ from tmt.methods import METHODS
 from ...core import timing
 from ...core.check import About, Result
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Setting
-from ...engines.outside.model import EngineError, TooLong
+from ...engines.outside.file import EngineError, TooLong
 from ...judge.agree import closest
 from ...judge.order import MeasuredOrder, check_order, measured_order
 from ...judge.rounding import step_rounding

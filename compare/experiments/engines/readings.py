@@ -1,13 +1,17 @@
 """What each engine has read: the numbers that differ from the compiled model, body by body and joint by joint, and why."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from ...core.check import About
 from ...core.words import some_of
 from ...engines import EngineRecord
-from ...engines.outside.model import OtherNames, Reading, size_of
+from ...engines.outside.bodies import size_of
+from ...engines.outside.file import File, OtherJoints
+from ...engines.outside.mjcf_text import REFUSED
+from ...engines.outside.model import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from .causes import Cause, Entry, Text, cause_of
@@ -23,7 +27,8 @@ FOLLOWS = {
     "inertia": ("moments", "mass"), "com": ("mass",), "axis_moved": ("axis",), "anchor_moved": ("anchor", "axis"),
     "com_moved": ("com", "axis", "anchor", "mass"),
 }  # fmt: skip
-REFUSED = "refused"  # in place of a number: the file itself
+# in place of a number, by the kind of error for which a copy was read: the file itself, or its joints
+OF_COPIES = {REFUSED: ["refused"], OtherJoints.__name__: ["joints"]}
 AS_READ = "as read"  # checks of numbers
 
 
@@ -34,7 +39,7 @@ def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, r
     if reading["copied"]:
         kind, message = reading["copied"]
         result.find("copied", engine=label, error=kind, reason=message.rstrip("."))
-        share.differing += [REFUSED] if kind != OtherNames.__name__ else []
+        share.differing += OF_COPIES.get(kind, [])
     if lacking:
         result.find("lacking", engine=label, numbers=lacking)
         share.differing += [f"no {number}" for number in lacking]
@@ -60,11 +65,14 @@ def add_differing(
     quantity, label, is_set = number.removesuffix("_moved"), record.label, reading["mended"][number]
     names, joints = named_after(robot, quantity)
     differs = ~(np.abs(values - stated) <= tolerance_of(reading, record, number))
-    wrong, places = {names[place] for place in np.flatnonzero(differs)}, np.flatnonzero(differs).tolist()
-    text, rows = Text(robot.mjcf), []
+    places = np.flatnonzero(differs).tolist()
+    wrong, bodies = {joints[place] for place in places}, bodies_of(robot)
+    file = File(Path(robot.mjcf), robot.joints, robot.coordinates.all_kinds)
+    text, rows = Text(file), []
     causes: dict[Cause | None, str] = {}
     for place in places:
-        cause = cause_of(Entry(text, reading, number, names[place], joints[place], place, wrong))
+        joint = joints[place]
+        cause = cause_of(Entry(text, reading, number, robot.joints, joint, bodies[joint], place, wrong))
         causes.setdefault(cause, names[place])
         pair = float(values[place]), float(stated[place])
         rows.append(
@@ -86,15 +94,16 @@ def named_after(robot: Robot, number: str) -> tuple[list[str], list[int]]:
     if number not in ENTRIES:
         joints = [k for k, joint in enumerate(places) for _ in range(joint.qd.stop - joint.qd.start)]
         return list(robot.coordinates.speeds), joints
-    names = list(robot.joints) if number in OF_JOINTS else bodies_of(robot)
+    of_bodies = [some_of(names) or joint for names, joint in zip(bodies_of(robot), robot.joints)]
+    names = list(robot.joints) if number in OF_JOINTS else of_bodies
     joints = np.repeat(np.arange(len(names)), ENTRIES[number]).tolist()
     return [names[joint] for joint in joints], joints
 
 
-def bodies_of(robot: Robot) -> Sequence[str]:
-    """The bodies that move with each joint and not with the next one; the joint where there is none."""
+def bodies_of(robot: Robot) -> Sequence[Sequence[str]]:
+    """The bodies that move with each joint and not with the next one."""
     bodies: list[list[str]] = [[] for _ in robot.joints]
     for body, joint in zip(robot.tree.body_names, robot.tree.body_joint):
         if joint >= 0:
             bodies[joint].append(body)
-    return [some_of(names) or joint for names, joint in zip(bodies, robot.joints)]
+    return bodies

@@ -9,7 +9,7 @@ import tmt
 
 from ...engines import GRID, LABELS, RECORDS, Array, Dynamics, Engine, Method, Setting
 from ...engines.outside import Outside
-from ...engines.outside.model import EngineError
+from ...engines.outside.file import EngineError
 from ...judge.run import diverged_at
 from ...judge.scale import FACTOR
 from ...robots.case import Case
@@ -20,13 +20,8 @@ from .tables import EnginesResult, ServoRow
 
 SERVOS = "servos"  # a tag of scenes
 OWN, HELD, AT_EACH_STAGE = "own actuators", "PD held for each step", "PD at each stage"
-HOW = {
-    "mujoco": OWN,
-    "mjx": OWN,
-    "mjx_float32": OWN,
-    "warp": OWN,
-    "drake RK3": AT_EACH_STAGE,
-}  # the others: HELD
+# the others: HELD
+HOW = dict.fromkeys(("mujoco", "mjx", "mjx_float32", "warp"), OWN) | {"drake RK3": AT_EACH_STAGE}
 METHODS = {"mujoco": ("Euler", "implicitfast", "discrete", "RK4"), "mjx": ("implicitfast",), "mjx_float32": ("implicitfast",),
            "drake": ("RK3", "discrete")}  # fmt: skip
 HALF = 0.5  # orders that a fall by half of the step may lack

@@ -24,9 +24,6 @@ class EngineRow(Row):
     difference_over_bar: float | None
     difference_eps: float  # the largest distance from the exact value
     mujoco_eps: float
-    worst_q: str
-    worst_qd: str
-    worst_tau: str
     passed: bool
 
 

@@ -1,7 +1,6 @@
 """What each scene needs of the model: the joints that can be locked without changing its motion."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -10,71 +9,31 @@ from tmt.exact.tree import DIGITS
 from ...core.check import About
 from ...core.finding import Finding
 from ...engines.mujoco import ModelError
-from ...judge.rounding import NARROW
-from ...judge.run import movement_unit
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...robots.case import Case
+from ...truth.smallest import needed
 from .. import Experiment
-from ..setup import Setup, nothing
+from ..setup import Setup
 from . import of_file
 from .exact_motion import compare_swing, is_pendulum
-from .needs import compare_case, largest_gain, time_models
-from .records import Need, ReductionResult
+from .records import Need, NeedRow, ReductionResult
 from .sub_blocks import compare_blocks
 
 EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
-    timed=True,
 )
-NO_GAIN = 1.05  # a smaller speedup is within the accuracy of the times
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:
     joint = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
-    unit = movement_unit(robot.coordinates)
-    return {"joint": joint, "unit": unit, "digits": DIGITS, "eps": FACTOR, "narrow": NARROW}
+    return {"joint": joint, "digits": DIGITS, "eps": FACTOR}
 
 
-def begin(setup: Setup) -> Iterable[ReductionResult]:
-    """Start everything that is not timed, in parallel with other work."""
-    alone = replace(setup, map=map, quiet=nothing, progress=nothing, reading=None)
-    return setup.map(untimed, [alone])
-
-
-def rows(setup: Setup, work: Iterable[ReductionResult] | None = None) -> ReductionResult:
+def rows(setup: Setup) -> ReductionResult:
     """Sub-blocks with joints locked; of a file what its motion needs, of the arm what each scene needs; exact swings."""
-    (result,) = begin(setup) if work is None else work
-    if setup.alone and setup.reading and not setup.robot.is_stated:
-        of_file.add(result, setup, setup.reading)
-    if result.models:
-        setup.quiet()
-        time_models(result, setup, rounds=setup.of(64, 16, 2))
-        best = largest_gain(result.rows, setup.robot.coordinates.nv)
-        if best and (best.speedup or 0.0) >= NO_GAIN:
-            joints = best.hinges.split()
-            result.headline = result.finding(
-                "headline", speedup=best.speedup, joints=joints, scene=best.scene
-            )
-    result.top += answers(result, setup.robot)
-    return result
-
-
-def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
-    """What scenes need, a finding for those that need the same; what can be locked comes last."""
-    groups: dict[Need, list[str]] = {}
-    for scene, need in result.needs.items():
-        groups.setdefault(need, []).append(scene)
-    findings, about = [], claim_values(robot)
-    for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
-        apart = max((value for (scene, _), value in result.apart.items() if scene in scenes), default=None)
-        findings.append(result.finding("answer", scenes=scenes, apart=apart, about=about, **need._asdict()))
-    return findings
-
-
-def untimed(setup: Setup) -> ReductionResult:
-    """The parts of `rows` that are not timed, and the models to be timed."""
     result, robot = ReductionResult("reduction"), setup.robot
     if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
         result.find("driven", scenes=driven)
@@ -83,7 +42,7 @@ def untimed(setup: Setup) -> ReductionResult:
             compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
         for case in robot.cases_of_torque:
             if not robot.is_read:
-                result.models += compare_case(result, case, setup)
+                add_need(result, case)
             if is_pendulum(case):
                 compare_swing(result, setup, case)
     except ModelError as error:
@@ -94,7 +53,30 @@ def untimed(setup: Setup) -> ReductionResult:
             result.check(
                 "every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM
             )
+    if setup.alone and setup.reading and not robot.is_stated:
+        of_file.add(result, setup, setup.reading)
+    result.top += answers(result, robot)
     return result
+
+
+def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
+    """What scenes need, a finding for those that need the same; what can be locked comes last."""
+    groups: dict[Need, list[str]] = {}
+    for scene, need in result.needs.items():
+        groups.setdefault(need, []).append(scene)
+    findings, about = [], claim_values(robot)
+    for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
+        findings.append(result.finding("answer", scenes=scenes, about=about, **need._asdict()))
+    return findings
+
+
+def add_need(result: ReductionResult, case: Case) -> None:
+    """Which joints a case needs, and why."""
+    need = needed(case)
+    names = tuple(name for name in case.joints if name in need.moves)
+    rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
+    result.tables.setdefault("reduction_needs", []).extend(rows)
+    result.needs[case.name] = Need(names, case.scene.locked, need.stays)
 
 
 def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:
@@ -102,5 +84,3 @@ def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:
 
     if frontier := result.tables.get("reduction_frontier"):
         yield partial(figures_reduction.draw_frontier, result, frontier)
-    for scene in result.swings:
-        yield partial(figures_reduction.draw_swing, result, scene)

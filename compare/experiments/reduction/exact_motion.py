@@ -1,21 +1,17 @@
 """Both engines compared with an exact motion: the swing of a single free hinge, a physical pendulum."""
 
-from collections.abc import Mapping, Sequence
-
 import numpy as np
 
 from ...core.check import Result
-from ...engines import LABELS
-from ...judge.order import check_order, measured_order
+from ...engines import LABELS, same_scheme
+from ...judge.order import check_order
 from ...judge.run import MOVES
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing
 from ..setup import Setup
-from .needs import rk4_of
-from .records import ReductionResult, Swing
+from .records import ReductionResult
 
-SWING_STEPS = (4, 8, 16, 32, 64, 128)  # multiples of the case's own steps
-IN_TABLE = 16  # the one of these whose error is in the table
+COARSE, FINE = 32, 64  # multiples of the steps of the case
 ORDER = 4  # of RK4
 ROUNDED = 1e-11  # rad: smaller errors contain rounding
 
@@ -28,34 +24,30 @@ def is_pendulum(case: Case) -> bool:
 
 
 def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
-    """Errors of RK4 fall at its order; not checked where the hinge turns over or hardly moves."""
-    (q,), (v,), t = *case.start, np.linspace(0.0, case.duration, SWING_STEPS[0] * case.steps + 1)
+    """The error of RK4 falls at its order; not checked where the hinge turns over or hardly moves."""
+    (q,), (v,), t = *case.start, np.linspace(0.0, case.duration, case.steps + 1)
     hanging, frequency = pendulum(case.tree)
     exact = swing(t, q, v, hanging, frequency) if frequency else np.full_like(t, np.nan)
     if not np.ptp(exact) >= MOVES:  # NaN where it turns over
         return
-    dt = [case.duration / case.steps / finer for finer in SWING_STEPS]
-    errors: dict[str, list[float]] = {}
+    engines = []
     for engine, dynamics in setup.compared(case).items():
-        method, errors[engine] = rk4_of(setup.engines, engine).name, []
-        for finer, step in zip(SWING_STEPS, dt):
-            path = dynamics.run(*case.start, case.tau, step, finer * case.steps, method).q
-            errors[engine].append(float(np.abs(path[:: finer // SWING_STEPS[0], 0] - exact).max()))
-        result.apart[case.name, engine] = errors[engine][SWING_STEPS.index(IN_TABLE)]
-    result.swings[case.name] = Swing(dt, errors, check_falling(result, case.name, dt, errors))
+        method = same_scheme(setup.engines, setup.engines["mujoco"].methods["RK4"], engine).name
+        errors = []
+        for finer in (COARSE, FINE):
+            dt, steps = case.duration / case.steps / finer, finer * case.steps
+            path = dynamics.run(*case.start, case.tau, dt, steps, method).q
+            errors.append(float(np.abs(path[::finer, 0] - exact).max()))
+        order = check_falling(result, f"{case.name}, RK4, {LABELS[engine]}", *errors)
+        engines.append((LABELS[engine], order, errors[-1]))
+    result.find("swing", scene=case.name, engines=engines)
 
 
-def check_falling(
-    result: Result, scene: str, dt: Sequence[float], errors: Mapping[str, Sequence[float]]
-) -> dict[str, float]:
-    """The orders at which errors, rad, fall, and their checks: between the last two of at least ROUNDED."""
-    orders = {}
-    for engine, values in errors.items():
-        is_rounded = [value <= ROUNDED for value in values]
-        clear = [*is_rounded, True].index(True)  # the errors above rounding, from the first on
-        measured = measured_order(dt[:clear], values[:clear])
-        if measured:
-            orders[engine] = measured.order
-            where = f"{scene}, RK4, {LABELS[engine]}"
-            check_order(result, where, ORDER, measured.order, "error from the elliptic function")
-    return orders
+def check_falling(result: Result, where: str, coarse: float, fine: float) -> float | None:
+    """The order at which an error falls, rad, at half the step; None: it is rounding."""
+    if fine <= ROUNDED:
+        return None
+    with np.errstate(divide="ignore"):
+        order = float(np.log2(coarse / fine))
+    check_order(result, where, ORDER, order, "error from the elliptic function")
+    return order

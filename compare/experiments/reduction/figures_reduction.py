@@ -1,4 +1,4 @@
-"""Figures of reduction: time over error of a file's models; exact swings."""
+"""The figure of reduction: time over error of a file's models."""
 
 from collections.abc import Sequence
 from itertools import cycle, product
@@ -7,9 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ...core.finding import Finding
-from ...core.words import capital
-from ...engines import COLOURS, LABELS, MARKS
-from ...report.style import LINES, WIDTH, file_name
+from ...report.style import LINES, WIDTH
 from .records import FrontierRow, ReductionResult
 
 MARKS_OF_INTEGRATORS = "osD^v"
@@ -37,24 +35,3 @@ def draw_frontier(result: ReductionResult, rows: Sequence[FrontierRow]) -> tuple
     ax.set_xscale("symlog", linthresh=smallest / 10.0)  # models without an error are shown too
     ax.set(yscale="log", xlabel="error, rad or m", ylabel="time for a second of motion, s")
     return "reduction_frontier", fig, result.finding("frontier", "reduction_of_file")
-
-
-def draw_swing(result: ReductionResult, scene: str) -> tuple[str, Figure, Finding]:
-    """Error of a swing of one hinge against the elliptic function, over the step."""
-    dt, errors, orders = result.swings[scene]
-    fig = Figure(figsize=(WIDTH, 3.0), layout="constrained")
-    ax = fig.subplots()
-    engines = []
-    for engine, values in errors.items():
-        ax.loglog(
-            dt,
-            values,
-            marker=MARKS[engine],
-            color=COLOURS[engine],
-            mfc="none",
-            label=f"{LABELS[engine]}, RK4",
-        )
-        engines.append({"engine": LABELS[engine], "order": orders.get(engine), "error": values[-1]})
-    ax.set(xlabel="dt, s", ylabel="maximum error of the angle, rad")
-    ax.legend()
-    return file_name("reduction", scene), fig, result.finding("swing", scene=capital(scene), engines=engines)

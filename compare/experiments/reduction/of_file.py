@@ -1,7 +1,8 @@
 """No more model than a motion of a file needs: the answer, its tables, its checks, and the file to take away."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -10,22 +11,21 @@ from tmt import Tree
 
 from ...core.check import About
 from ...core.text import block
-from ...engines.mujoco.motion import Simulation, apart, near, stages_of
+from ...engines.mujoco.motion import near, stages_of
 from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
-from ...engines.mujoco.smaller import Smaller, finished, of_parts
+from ...engines.mujoco.smaller import Smaller, assets_of, files_of, finished, of_parts
 from ...engines.mujoco.source import Source
 from ...judge.agree import worst_of_each
 from ...judge.entries import Entries
-from ...judge.run import movement_unit
+from ...judge.run import movement_unit, number_or_none
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
-from ...stability.answer import Asked, answer
-from ...stability.place import postures_of
 from ..setup import Setup
-from .records import FreeRow, JointRow, LimitRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
+from .limits import compared_limits, stable_answers
+from .records import FreeRow, JointRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
-from .search import Answer, Locks, answer_within, frontier, seconds_of, take_out
+from .search import Answer, Locks, frontier, seconds_of, take_out
 from .sub_blocks import check_blocks, units_of
 
 TEXT = "reduction_of_file"  # the template
@@ -49,18 +49,18 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     locks = Locks(scene, kinds[-1][1] if kinds else scene.whole)
     candidates = frontier(scene, locks, errors, setup.quiet)
     rows = [candidate.row for candidate in candidates]
-    answers = [answer_within(rows, error) for error in errors]
+    answers = stable_answers(scene, candidates, errors)
     for best in answers:
         best.row.best_for = f"{best.row.best_for}, {best.allowed:g}".strip(", ")
     chosen, row = answers[1], answers[1].row
     candidate = next(candidate for candidate in candidates if candidate.row is row)
     locked = locks.positions(candidate.groups)
-    small = finished(candidate.small, scene.motion, row.dt, row.integrator)
+    small = finished(candidate.small, scene.motions, row.dt, row.integrator)
     facts = {
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
-        "scene": {"name": scene.motion.name, "duration": scene.motion.duration},
+        "scene": {"name": scene.name, "duration": scene.duration},
         "names": list(locked),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
@@ -70,18 +70,18 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "file": str(reading.source),
         "command": setup.command,
         "write": setup.request.write,
-        "meshes": bool(small.spec.meshes or small.spec.hfields),
         "free": [row for row, _ in kinds],
     }
-    text = small.text(block(TEXT, "comment", facts=facts))
-    if setup.request.write:
-        Path(setup.request.write).write_text(text, encoding="utf-8")
     add_tables(result, scene, locks, list(locked), kinds, small)
-    facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, text)
+    with TemporaryDirectory() as folder:
+        path = Path(setup.request.write or Path(folder) / "smaller.xml")
+        facts["assets"] = assets_of(path).name if files_of(small.spec) else ""
+        small.write(path, block(TEXT, "comment", facts=facts))
+        written = Smaller.whole(Source(path))
+    facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, written)
     result.tables["reduction_frontier"] = rows
     integrators = list(dict.fromkeys((reading.integrator, row.integrator, DEFAULT)))
-    for model, file in (("whole", scene.whole), ("smaller", small)):
-        result.tables.setdefault("reduction_limits", []).extend(limits_of(scene, file, model, integrators))
+    result.tables["reduction_limits"] = compared_limits(scene, small, integrators)
     facts |= {"limits": result.tables["reduction_limits"], "pairs": result.tables["reduction_near"]}
     texts = "answer", "for_nothing", "gains", "limits"
     result.top[:0] = [result.finding(kind, TEXT, facts=facts) for kind in texts]
@@ -108,38 +108,30 @@ def add_tables(
     for number, (row, _) in enumerate(kinds):
         row.before, row.after = (1e6 * times[place] / runs[0].steps for place in (number, number + 1))
     result.tables["reduction_free"] = [row for row, _ in kinds]
-    predicted = {name: group.predicted for group in locks.groups for name in group.names}
-    result.tables["reduction_joints"] = [
-        JointRow(joint=name, moved=moved, predicted=predicted.get(name), locked=name in names)
-        for name, moved in sorted(use.ranges.items(), key=lambda item: item[1])
-    ]
-    pairs = near(scene.run(scene.whole), use.pairs)
+    joints = {name: JointRow(name, moved, locked=name in names) for name, moved in use.ranges.items()}
+    for number, group in enumerate(locks.groups):
+        for name in group.names:
+            joints[name].predicted = group.predicted
+            joints[name].error_alone = number_or_none(locks.error_alone(number))
+    result.tables["reduction_joints"] = sorted(joints.values(), key=lambda joint: joint.moved)
+    pairs = near(scene.whole.model, scene.positions(scene.whole), use.pairs)
     result.tables["reduction_near"] = [PairRow(*pair, distance) for pair, distance in pairs.items()]
 
 
 def use_of(scene: Scene) -> list[UseRow]:
     """What the file has and the motion used."""
     use, model = scene.use, scene.whole.model
-    collide = (model.geom_contype | model.geom_conaffinity) != 0
-    parts = {
-        "geoms that touch": (collide.sum(), use.geoms),
-        "pairs that touch": (None, {" and ".join(pair) for pair in use.pairs}),
-        "limits of joints": (model.jnt_limited.sum(), use.acted["joint"]),
-        "limits and friction of tendons": (model.ntendon, use.acted["tendon"]),
-        "equalities": (model.neq, use.acted["equality"]),
-        "actuators": (number_of_actuators(model), use.acted["actuator"]),
-        "sensors": (model.nsensor, set()),  # no controller reads them
-        "joints that move": (model.njnt, {name for name, moved in use.ranges.items() if moved > STILL}),
-    }
-    return [
-        UseRow(
-            part=part,
-            in_file=count if count is None else int(count),
-            used=len(names),
-            names=", ".join(sorted(names)),
-        )
-        for part, (count, names) in parts.items()
+    parts: list[tuple[str, int | None, set[str]]] = [
+        ("geoms that touch", int(((model.geom_contype | model.geom_conaffinity) != 0).sum()), use.geoms),
+        ("pairs that touch", None, {" and ".join(pair) for pair in use.pairs}),
+        ("limits of joints", int(model.jnt_limited.sum()), use.acted["joint"]),
+        ("limits and friction of tendons", model.ntendon, use.acted["tendon"]),
+        ("equalities", model.neq, use.acted["equality"]),
+        ("actuators", number_of_actuators(model), use.acted["actuator"]),
+        ("sensors", model.nsensor, set()),  # no controller reads them
+        ("joints that move", model.njnt, {name for name, moved in use.ranges.items() if moved > STILL}),
     ]
+    return [UseRow(part, count, len(names), ", ".join(sorted(names))) for part, count, names in parts]
 
 
 def add_checks(
@@ -149,24 +141,25 @@ def add_checks(
     locked: Mapping[str, np.ndarray],
     chosen: Answer,
     small: Smaller,
-    text: str,
+    written: Smaller,
 ) -> float:
     """What is taken out changes no bit; the written file is within the error; its equations are those of tmt's lock.
 
     How far the written file, with six digits, is from the model in memory, rad or m.
     """
-    motion, unit, row = scene.motion, movement_unit(scene.coordinates), chosen.row
-    changed = apart(scene.run(Smaller(free.spec.copy())), scene.run(scene.whole), motion)
-    result.check(motion.name, "motion without what is not used", changed, 0.0, unit, rule="equal")
+    unit, row = movement_unit(scene.coordinates), chosen.row
+    changed = scene.apart(scene.run(Smaller(free.spec.copy())), scene.run(scene.whole))
+    result.check(scene.name, "motion without what is not used", changed, 0.0, unit, rule="equal")
     quantity, exact = "error of the smaller file", scene.finely
     if chosen.at_own_step:
         quantity, exact = "smaller file to the file as it is, by its own step", scene.run
-    path = Simulation(read(Source(text)).model, motion, row.dt, row.integrator)()
-    note, error = f"{row.locked} joints locked", apart(path, exact(scene.whole), motion)
-    result.check(motion.name, quantity, error, chosen.allowed, unit, note, about=About.PREDICTION)
+    paths, note = scene.run(written, row.dt, row.integrator), f"joints locked: {row.locked}"
+    for motion, path, other in zip(scene.motions, paths, exact(scene.whole)):
+        error = scene.apart([path], [other])
+        result.check(motion.name, quantity, error, chosen.allowed, unit, note, about=About.PREDICTION)
     tree = scene.reading.tree.lock(of_parts(scene.whole.model, locked))
-    compare_locked(result, f"{motion.name}, {note}", tree, read(small.model).tree)
-    return apart(path, Simulation(small.model, motion, row.dt, row.integrator)(), motion)
+    compare_locked(result, f"{scene.name}, {note}", tree, read(small.model).tree)
+    return scene.apart(paths, scene.run(small, row.dt, row.integrator))
 
 
 def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tree) -> None:
@@ -181,14 +174,3 @@ def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tre
         unit, parties = units_of(coordinates)[quantity], "lock of tmt to the smaller model"
         row = SubsetRow(locked="", quantity=quantity, parties=parties, unit=unit)
         check_blocks(result, where, row, *worst_of_each(differences, entries))
-
-
-def limits_of(scene: Scene, small: Smaller, model: str, integrators: Sequence[str]) -> list[LimitRow]:
-    """The step limits of a file, where the robot rests near the start of the motion."""
-    start = finished(small, scene.motion, scene.reading.dt, scene.reading.integrator)
-    reading = read(Source(start.text()))
-    asked = Asked(reading.dt, reading.integrator, integrators, in_runs=False)
-    return [
-        LimitRow(model, row.integrator, row.limit, row.predicted_dt, row.limiting_joint)
-        for row in answer(postures_of(reading)[0], True, reading, asked).rows
-    ]

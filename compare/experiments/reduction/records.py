@@ -1,26 +1,10 @@
-"""What reduction finds: rows of its tables, what each scene needs, and swings that are known exactly."""
+"""What reduction finds: rows of its tables, and what each scene needs."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from ...core.check import Result
-from ...core.rows import MOVEMENT, MovementRow, Row, column
-from ...robots.case import Case
-
-
-@dataclass(kw_only=True)
-class ReductionRow(MovementRow):
-    """The time of an RK4 step of a model in an engine."""
-
-    scene: str
-    hinges: str = column(names=True)
-    engine: str
-    nv: int
-    operations: int | None
-    ns_per_step: float | None = None
-    speedup: float | None = None  # relative to the whole model
-    max_difference: float | None = column(MOVEMENT, default=None)  # from the whole model
-    integrator: str = "RK4"
+from ...core.rows import Row, column
 
 
 @dataclass
@@ -76,12 +60,16 @@ class FreeRow(Row):
 
 @dataclass
 class JointRow(Row):
-    """How far a joint moved, rad or m, and how far it would move another one if it were locked; None: it is not to be."""
+    """How far a joint moved, rad or m. None: it is not to be locked.
+
+    predicted: how far it would move another one if it were locked; error_alone: the error of its lock in a run.
+    """
 
     joint: str
     moved: float
-    predicted: float | None
-    locked: bool
+    predicted: float | None = None
+    error_alone: float | None = None
+    locked: bool = False
 
 
 @dataclass
@@ -95,12 +83,12 @@ class PairRow(Row):
 
 @dataclass
 class LimitRow(Row):
-    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv."""
+    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv, or rests_elsewhere."""
 
     model: str
     integrator: str
     limit: str
-    step: float | None = column("s", digits=4)
+    step: float | None = column("s", digits=4, default=None)
     joint: str = ""
 
 
@@ -122,10 +110,8 @@ class FrontierRow(Row):
     error_at_own_step: float | None = None
     time_of_second: float = column("s", default=0.0)  # of motion
     gain: float = 1.0  # over the file as it is
+    stable_at_rest: bool = True  # False: a step of an answer, or one as long, which is not stable there
     best_for: str = ""
-
-
-Model = tuple[str, Case | None]  # the name of a scene, and what is run; None: nothing moves
 
 
 class Need(NamedTuple):
@@ -136,15 +122,6 @@ class Need(NamedTuple):
     stays: tuple[str, ...]  # those that can be locked
 
 
-class Swing(NamedTuple):
-    dt: list[float]  # s
-    errors: dict[str, list[float]]  # of each engine, rad
-    orders: dict[str, float]
-
-
 @dataclass
 class ReductionResult(Result):
-    models: list[Model] = field(default_factory=list)  # that are timed
     needs: dict[str, Need] = field(default_factory=dict)  # by scene
-    apart: dict[tuple[str, str], float] = field(default_factory=dict)  # by scene and engine, rad or m
-    swings: dict[str, Swing] = field(default_factory=dict)  # by scene

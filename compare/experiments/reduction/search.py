@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.timing import fastest
-from ...engines.mujoco.motion import Path, Simulation, apart, couplings, joints
+from ...engines.mujoco.motion import Path, Simulation, couplings, joints
 from ...engines.mujoco.names import INTEGRATORS, kind_of
 from ...engines.mujoco.smaller import FREE, Smaller, locked, tied_joints
 from .records import FreeRow, FrontierRow
@@ -17,7 +17,6 @@ from .scene import Scene
 
 DOES, DOES_SLIDE = 0.1, 0.02  # rad, m: a joint that moves more is what the scene is about
 STEPS = 0.5, 1.0, 2.0, 4.0, 8.0  # multiples of the file's
-TRIES = 8  # joints that are tried after the first that costs too much
 FEW = 3  # models with the first 1, 2, 3 groups of joints locked are among those of the chart
 ROUNDS = 6  # of timing
 AS_FAST = 1.05  # fold: the accuracy of times
@@ -26,7 +25,7 @@ Groups = frozenset[int]  # of joints that are locked, by their numbers
 
 def take_out(scene: Scene) -> list[tuple[FreeRow, Smaller]]:
     """Take out one kind after the other, each only if the motion is the same to the last bit: a row, and the model then."""
-    path, small, kinds = scene.run(scene.whole), scene.whole, []
+    paths, small, kinds = scene.run(scene.whole), scene.whole, []
     for kind, edit in FREE.items():
         trial = Smaller(small.spec.copy())
         try:
@@ -35,14 +34,15 @@ def take_out(scene: Scene) -> list[tuple[FreeRow, Smaller]]:
         except ValueError:  # something else refers to it
             continue
         if count:
-            is_same = same_bits(scene.run(trial), path)
+            is_same = same_bits(scene.run(trial), paths)
             small = trial if is_same else small
             kinds.append((FreeRow(kind=kind, taken_out=count, same_bits=is_same), small))
     return kinds
 
 
-def same_bits(path: Path, other: Path) -> bool:
-    return path.q.tobytes() == other.q.tobytes() and path.v.tobytes() == other.v.tobytes()
+def same_bits(paths: Sequence[Path], others: Sequence[Path]) -> bool:
+    bits = [[(path.q.tobytes(), path.v.tobytes()) for path in run] for run in (paths, others)]
+    return bits[0] == bits[1]
 
 
 class Group(NamedTuple):
@@ -53,7 +53,7 @@ class Group(NamedTuple):
 
 
 def groups_of(scene: Scene, free: Smaller) -> list[Group]:
-    """The joints that may be locked, those that cost least by prediction first.
+    """The joints that may be locked.
 
     The prediction: were the joint locked, the others would be moved by its own movement times their coupling through M.
     """
@@ -61,15 +61,14 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
     most = {
         name: DOES_SLIDE if kind_of(model, number) == "slide" else DOES for number, name in enumerate(places)
     }
-    costs = couplings(scene.run(free), np.hstack([use.middle[name] for name in places]))
+    costs = couplings(model, scene.positions(free), np.hstack([use.middle[name] for name in places]))
     groups = []
     for names in tied_joints(model):
         if all(use.ranges[name] <= most[name] for name in names):
             speeds = np.r_[tuple(places[name][1] for name in names)]
             others = np.setdiff1d(np.arange(model.nv), speeds)
             groups.append(Group(names, float(costs[np.ix_(others, speeds)].max(initial=0.0))))
-    groups.sort(key=lambda group: group.predicted)
-    return groups[: len(places) - 1]
+    return sorted(groups, key=lambda group: group.predicted)
 
 
 class Locks:
@@ -77,8 +76,9 @@ class Locks:
 
     def __init__(self, scene: Scene, free: Smaller) -> None:
         self.scene, self.free, self.groups = scene, free, groups_of(scene, free)
-        self.path = scene.run(free)
+        self.paths = scene.run(free)
         self.model, self.error = cache(self.model_of), cache(self.error_of)
+        self.order = sorted(range(len(self.groups)), key=self.error_alone)
 
     def positions(self, groups: Iterable[int]) -> dict[str, np.ndarray]:
         names = {name for group in groups for name in self.groups[group].names}
@@ -96,19 +96,24 @@ class Locks:
         small = self.model(groups)
         if small is None or not small.model.nv:
             return np.inf
-        return apart(self.scene.run(small), self.path, self.scene.motion)
+        return self.scene.apart(self.scene.run(small), self.paths)
+
+    def error_alone(self, group: int) -> float:
+        return self.error(frozenset({group}))
+
+    def first(self, count: int) -> Groups:
+        """Those whose locks alone cost least."""
+        return frozenset(self.order[:count])
 
     def within(self, allowed: float) -> Groups:
-        """The groups that can be locked for an error: the first by prediction, and then each that the error allows."""
-        low, high = 0, len(self.groups) + 1  # the first `low` are within the error
-        while high - low > 1:
-            middle = (low + high) // 2
-            is_within = self.error(frozenset(range(middle))) <= allowed
-            low, high = (middle, high) if is_within else (low, middle)
-        chosen = frozenset(range(low))
-        for number in range(low, min(len(self.groups), low + TRIES)):
-            if self.error(chosen | {number}) <= allowed:
-                chosen |= {number}
+        """The groups that can be locked for an error: all, or each that the error allows, the one of least cost first."""
+        chosen = self.first(len(self.order))
+        if self.error(chosen) <= allowed:
+            return chosen
+        chosen = frozenset()
+        for group in self.order:
+            if self.error(chosen | {group}) <= allowed:
+                chosen |= {group}
         return chosen
 
 
@@ -127,31 +132,31 @@ def frontier(
 
     Those that are worse than all of the errors are left out; the file's own step stays.
     """
-    sets = {frozenset(range(count)) for count in range(min(FEW, len(locks.groups)) + 1)}
+    sets = {locks.first(count) for count in range(FEW + 1)}
     sets |= {locks.within(error) for error in errors}
     models = [("whole file", scene.whole, Groups())]
     for groups in sorted(sets, key=len):
         small, count = locks.model(groups), len(locks.positions(groups))
         if small and locks.error(groups) < np.inf:
-            models.append((f"{count} joints locked" if count else "without what is not used", small, groups))
+            models.append((f"joints locked: {count}" if count else "without what is not used", small, groups))
     reference, own = scene.finely(scene.whole), (scene.reading.integrator, scene.reading.dt)
     steps = [multiple * scene.reading.dt for multiple in STEPS]
     settings = [own, *(setting for setting in product(INTEGRATORS, steps) if setting != own)]
     candidates, runs = [], []
     for name, small, groups in models:
         fine = scene.finely(small)
-        error_of_model = apart(fine, reference, scene.motion)
+        error_of_model = scene.apart(fine, reference)
         for integrator, dt in settings:
-            run, is_own = Simulation(small.model, scene.motion, dt, integrator), (integrator, dt) == own
-            path = run()
+            run, is_own = scene.simulation(small, dt, integrator), (integrator, dt) == own
+            paths = run()
             row = FrontierRow(
                 model=name,
                 locked=len(locks.positions(groups)),
                 integrator=integrator,
                 dt=dt,
-                error=apart(path, reference, scene.motion),
+                error=scene.apart(paths, reference),
                 error_of_model=error_of_model,
-                error_of_step=apart(path, fine, scene.motion),
+                error_of_step=scene.apart(paths, fine),
                 error_at_own_step=locks.error(groups) if is_own else None,
             )
             if is_own or row.error <= max(errors):
@@ -160,7 +165,7 @@ def frontier(
     quiet()
     seconds = seconds_of(runs)
     for number, candidate in enumerate(candidates):
-        candidate.row.time_of_second = seconds[number] / scene.motion.duration
+        candidate.row.time_of_second = seconds[number] / scene.duration
         candidate.row.gain = seconds[0] / seconds[number]
     return candidates
 
@@ -171,11 +176,19 @@ def seconds_of(runs: Sequence[Simulation]) -> dict[int, float]:
 
 
 class Answer(NamedTuple):
-    """The fastest for an error. at_own_step: within it of the file's own run, as no gain is within it of the exact motion."""
+    """The fastest for an error, rad or m, of the exact motion or, at the file's own step, of its own run.
+
+    exact: the fastest for one of the exact motion; None: there is none.
+    """
 
     allowed: float
     row: FrontierRow
-    at_own_step: bool
+    exact: FrontierRow | None
+
+    @property
+    def at_own_step(self) -> bool:
+        """Whether it is within the error of the file's own run alone."""
+        return self.row.error > self.allowed
 
     @property
     def is_gain(self) -> bool:
@@ -183,12 +196,9 @@ class Answer(NamedTuple):
 
 
 def answer_within(rows: Sequence[FrontierRow], allowed: float) -> Answer:
-    """For an error, rad or m, of the exact motion; where nothing is gained so, of the file's run at its own step."""
-    exact = [row for row in rows if row.error <= allowed]
-    if exact and (answer := Answer(allowed, best_of(exact), False)).is_gain:
-        return answer
+    exact = [row for row in rows if row.error <= allowed and row.stable_at_rest]
     own = [row for row in rows if row.error_at_own_step is not None and row.error_at_own_step <= allowed]
-    return Answer(allowed, best_of(own), True)
+    return Answer(allowed, best_of([*exact, *own]), best_of(exact) if exact else None)
 
 
 def best_of(rows: Sequence[FrontierRow]) -> FrontierRow:

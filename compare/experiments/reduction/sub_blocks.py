@@ -14,7 +14,6 @@ from ...robots.case import SEED, Case
 from ...robots.coordinates import Coordinates
 from ...robots.states import seconds
 from ..setup import Setup
-from .needs import columns_of
 from .records import SubsetRow
 
 ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
@@ -59,6 +58,12 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
     if len(joints) <= ALL_SUBSETS:
         return [names for count in range(1, len(joints)) for names in combinations(joints, count)]
     return [(name,) for name in joints[:: -(-len(joints) // most)]]
+
+
+def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
+    """The columns of the smaller case's positions and speeds among those of a case."""
+    joints = [case.coordinates.by_name[name] for name in smaller.joints]
+    return np.r_[tuple(joint.q for joint in joints)], np.r_[tuple(joint.qd for joint in joints)]
 
 
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:

@@ -29,7 +29,6 @@ class EvaluationRow(Row):
     quantity: str
     implementation: str
     states: int = 1  # of one call
-    threads: int = 1
     ns_per_state: float | None = None
     operations: int | None = None
     operations_per_ns: float | None = None

@@ -218,7 +218,7 @@ def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: Step
     """What else matters of the step in use, and of MuJoCo's default step. default: that of Euler, where it is another."""
     if row is None:
         return
-    if row.decided_by_runs:
+    if row.decided_by_runs and row.limit in ("finite", "none"):
         tell("by_derivative", row=row, up_to=LONGEST)
     if row.finer_push and row.largest_push is not None and row.largest_push < USUAL_PUSH:
         tell("push", row=row)

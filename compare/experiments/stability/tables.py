@@ -1,19 +1,14 @@
 """The rows of the tables of stability, and its result."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from functools import partial
 
 from ...core.check import Result
 from ...core.rows import Column, Row, column
 from ...engines import LABELS
-from ...stability.answer import Curve
+from ...stability.answer import Curve, step_column
 
-STEP_DIGITS = 5  # of a step in a report
-
-
-def time_step(**more: Any) -> Any:
-    """A field with a time step, s."""
-    return column("s", digits=STEP_DIGITS, **more)
+time_step = partial(step_column, digits=5)
 
 
 @dataclass(kw_only=True)

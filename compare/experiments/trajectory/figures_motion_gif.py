@@ -57,8 +57,7 @@ def draw_motion(runs: Sequence[Run], label: str) -> tuple[str, Animation, Findin
     with np.errstate(over="ignore", invalid="ignore"):  # in runs that diverge
         scenes = [pictures_of(run) for run in runs]
     engines = [LABELS[name] for name in scenes[0].points]
-    seen = [{"name": scene.scene, "run": scene.run, "seen": scene.seen.values} for scene in scenes]
-    caption = Finding("trajectory", "figure_motion", {"engines": engines, "scenes": seen})
+    caption = Finding("trajectory", "figure_motion", {"engines": engines, "scenes": scenes})
     return "motion", Animation(scenes, label), caption
 
 

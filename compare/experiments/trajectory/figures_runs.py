@@ -85,11 +85,9 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
-    errors = result.errors.get(case.name)
     caption = result.finding(
-        "figure_run", scene=case.robot.scene_begins(case.name), unit=unit, shown=len(shown),
+        "figure_run", scene=case.robot.scene_begins(case.name), shown=len(shown),
         positions=case.coordinates.nv, balls=case.coordinates.has_balls,
-        errors=errors and dict(zip((result.label, "MuJoCo"), errors)),
         share=largest_known([row.difference_over_band for row in rows]),
         judged=[(run.integrator, run.judged_until) for run in runs],
     )  # fmt: skip

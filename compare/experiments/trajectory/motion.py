@@ -5,9 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.finding import Finding
-from ...engines import LABELS
-from ...judge.run import LEFT, movement_unit, step_in_words
+from ...judge.run import movement_unit, step_in_words
 from ...robots import Robot
 from ...robots.stick import as_seen, stick_figure
 from .errors import SCHEMES_OF_RK4
@@ -28,7 +26,6 @@ class Pictures(NamedTuple):
     apart: np.ndarray  # (pictures,): the largest difference of a joint; NaN if an engine has diverged
     unit: str  # of that
     left: dict[str, float | None]  # by engine: when a held robot left its posture, s
-    seen: Finding  # departures, the largest difference, divergence
     fixed: bool  # whether the first point does not move, as the first joint only turns
 
 
@@ -66,13 +63,5 @@ def pictures_of(run: Run) -> Pictures:
         positions.append(np.where(alive[:, None], q, np.nan))
     apart = np.abs(case.coordinates.difference(*positions)).max(axis=1)
     left = {engine: path.left if case.is_held else None for engine, path in run.paths.items()}
-    leaves = [{"label": LABELS[name], "left": time} for name, time in left.items()]
-    ended = {LABELS[engine]: path.ended for engine, path in run.paths.items() if path.ended is not None}
-    seen = Finding("trajectory", "seen", {
-        "noun": case.robot.noun, "unit": unit, "limit": LEFT, "held": case.is_held, "end": case.duration,
-        "leaves": leaves if any(left.values()) else [],
-        "apart": float(np.nanmax(apart)) if np.isfinite(apart).any() else None,
-        "diverged": [{"label": label, "time": end} for label, end in ended.items()],
-    })  # fmt: skip
     label, fixed = f"{run.integrator}, {step_in_words(case, run.steps)}", case.robot.tree.kind[0] != "slide"
-    return Pictures(case.name, label, run.t[every], points, links, apart, unit, left, seen, fixed)
+    return Pictures(case.name, label, run.t[every], points, links, apart, unit, left, fixed)

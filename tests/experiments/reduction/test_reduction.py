@@ -1,6 +1,5 @@
 """Reduction: a small run, joints locked in both engines, what each scene needs; its rules just inside and just outside."""
 
-import dataclasses
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,48 +12,30 @@ from compare.core.check import Result
 from compare.core.text import say
 from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
-from compare.experiments.followed import Deviation
-from compare.experiments.reduction import exact_motion, needs, sub_blocks
+from compare.experiments.reduction import exact_motion, sub_blocks
 from compare.experiments.reduction.records import ReductionResult, SubsetRow
-from compare.experiments.setup import Setup
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
-from compare.robots.case import Coordinates
-from compare.truth.smallest import needed, reduced
+from compare.truth.smallest import needed
 
 ORDERS = {4.149: True, 4.151: False, 3.851: True, 3.849: False}
-FALLING = [([2.0**order * 1e-8, 1e-8, 9e-12, 8e-12], [passes]) for order, passes in ORDERS.items()]
 
 
 def failed(result) -> list[str]:
     return [str(check) for check in result.checks if not check.passed]
 
 
-def test_a_small_run_takes_every_path_and_every_figure_has_numbers(small):
+def test_a_small_run_has_what_each_scene_needs_and_the_exact_swing(small):
     result = small("reduction")
-    rows = {(row.scene, row.hinges, row.engine): row for row in result.rows}
-    assert {scene for scene, *_ in rows} == {scene.name for scene in ARM.scenes}
-    planar, whole = (rows["zero, free", hinges, "tmt"] for hinges in ("alpha gamma", "alpha beta gamma"))
-    assert 0 < planar.operations < whole.operations and planar.ns_per_step > 0
-    assert rows["bent, held", "none", "mujoco"].ns_per_step is None
-    drawn = {name: caption for name, _, caption in (figure() for figure in reduction.figures(result, ARM))}
-    assert list(drawn) == ["reduction_elbow_swing"]
-    assert not any("nan" in say(caption) for caption in drawn.values())
+    assert set(result.needs) == {scene.name for scene in ARM.scenes}
+    (swing,) = [say(finding) for finding in result.notes if finding.kind == "swing"]
+    assert swing.startswith("elbow swing") and "nan" not in swing
 
 
 def test_a_model_whose_joints_cannot_be_locked_fails():
     tendon = '<tendon><fixed><joint joint="alpha" coef="1"/><joint joint="gamma" coef="1"/></fixed></tendon></mujoco>'
-    (check,) = reduction.untimed(setup_of(XML.replace("</mujoco>", tendon))).checks
+    (check,) = reduction.rows(setup_of(XML.replace("</mujoco>", tendon))).checks
     assert check.quantity == "models whose hinges can be locked" and not check.passed
-
-
-def test_nothing_is_timed_before_all_else_has_ended_and_what_was_begun_is_not_done_again(setup, monkeypatch):
-    log, result = [], ReductionResult("reduction", models=[("", None)])
-    monkeypatch.setattr(reduction, "untimed", lambda setup: log.append("computed") or result)
-    monkeypatch.setattr(reduction, "time_models", lambda *_, **__: log.append("timed"))
-    setup = dataclasses.replace(setup, quiet=lambda: log.append("quiet"))
-    reduction.rows(setup, reduction.begin(setup))
-    assert log == ["computed", "quiet", "timed"]
 
 
 def blocks(setup, angles=1) -> Result:
@@ -111,37 +92,8 @@ def test_of_many_joints_some_are_locked_each_alone():
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'
-    result = reduction.untimed(setup_of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
+    result = reduction.rows(setup_of_file(f"<mujoco><worldbody>{aligned}</worldbody></mujoco>"))
     assert [note.kind for note in result.top] == ["not_lockable"] and failed(result) == []
-
-
-def test_the_planar_arm_moves_as_the_whole_one(engines):
-    case, setup, result = ARM.cases[0], Setup.small(ARM, engines), ReductionResult("reduction")
-    smaller = reduced(case)
-    assert smaller.joints == ("alpha", "gamma")
-    assert needs.operations(tmt.ARM) > 2 * needs.operations(smaller.tree) > 0
-    needs.compare_smaller(result, case, smaller, setup)
-    assert len(result.checks) == 6 and failed(result) == []
-    # a planar arm that starts elsewhere is another motion
-    needs.compare_smaller(result, case, smaller.changed(posture=(0, 0, 1e-6)), setup)
-    assert {check.quantity for check in result.checks if not check.passed} == {"smallest model to whole"}
-
-
-def test_each_engine_is_compared_with_its_own_smaller_model(mujoco):
-    braked = WrongLock(mujoco, lambda case: mujoco.of(case.changed(damping=1e-6)))
-    case, result = ARM.cases[0], ReductionResult("reduction")
-    needs.compare_smaller(result, case, reduced(case), setup_of(braked))
-    assert [check.scene.split(", ")[2] for check in result.checks if not check.passed] == ["MuJoCo"]
-
-
-def test_of_a_users_own_scene_nothing_is_expected_but_agreement(engines):
-    """A motion that is small is no failure."""
-    more = {"duration": 0.5, "dt": 1 / 64, "judged": 0.0, "tags": ("own",)}
-    case = ARM.case("own", posture="hanging", speed=(0, 1e-3, 0), **more)
-    result = ReductionResult("reduction")
-    (_, whole), *smaller = needs.compare_case(result, case, Setup.small(ARM, engines))
-    assert failed(result) == [] and "movement" not in {check.quantity for check in result.checks}
-    assert whole.joints == ARM.joints and smaller == []
 
 
 def test_a_held_posture_with_springs_needs_nothing():
@@ -166,31 +118,12 @@ def test_sub_blocks_agree_within_64_eps(apart, passes):
     assert found == {"Mbar, reduced, TMT to MuJoCo": passes}
 
 
-@pytest.mark.parametrize("apart, width, required, within, long_enough", [
-    (0.99e-9, 1e-9, 5.0, True, True), (1.01e-9, 1e-9, 5.0, False, True), (np.nan, 1e-9, 5.0, False, True),
-    (1e-300, 0.0, 5.0, False, True), (0.0, 0.99e-3, 5.0, True, True),
-    (1.0, 1.01e-3, 3.0, True, True),  # too wide from 4 s on: then nothing is judged there
-    (0.0, 1.01e-3, 3.01, True, False),
+@pytest.mark.parametrize("coarse, fine, passed", [  # the second is that of half the step
+    *((2.0**order * 1e-8, 1e-8, [passes]) for order, passes in ORDERS.items()),
+    (1.76e-10, 1.1e-11, [True]), (1.0, 9e-12, []), (1e-3, np.nan, [False]),  # hidden by rounding; a run that ends
 ])  # fmt: skip
-def test_the_smallest_model_is_judged_while_the_band_is_narrow(apart, width, required, within, long_enough):
-    t = np.arange(6.0)
-    off, band = np.zeros((6, 4)), np.full((6, 4), 1e-9)
-    off[4, 1], band[4, 1] = apart, width
-    deviation = Deviation(Coordinates(("alpha", "gamma")), t, off, band)
-    found = verdicts(needs.check_smaller, "zero, free", deviation, required)
-    assert found == {"smallest model to whole": within, "time judged": long_enough}
-
-
-@pytest.mark.parametrize("errors, passed", [  # each of half the step of the last; those below 1e-11 rad are rounding
-    *FALLING, ([2.0**4 * 1.1e-11, 1.1e-11, 9e-12, 8e-12], [True]),  # just above rounding
-    ([1.0, 0.9, 2.0**4 * 1e-9, 1e-9, 9e-12], [True]), ([1.0, 2.0**-4, 0.9e-9, 0.8e-9, 9e-12], [False]),  # the finest count
-    ([2.0**4 * 1e-9, 1e-9, 9e-12, 1.1e-11, 2e-11], [True]),  # rounding that grows is no error of the method
-    ([2e-11, 9e-12, 1e-13, 2e-11], []), ([1e-3, np.nan, np.nan], [False]),  # hidden by rounding; a run that ends
-])  # fmt: skip
-def test_errors_fall_at_the_order_of_the_method(errors, passed):
-    dt = [0.1 / 2**k for k in range(len(errors))]
-    found = verdicts(exact_motion.check_falling, "swing", dt, {"tmt": errors})
-    assert list(found.values()) == passed
+def test_errors_fall_at_the_order_of_the_method(coarse, fine, passed):
+    assert list(verdicts(exact_motion.check_falling, "swing", coarse, fine).values()) == passed
 
 
 def swings(model, **scene) -> ReductionResult:
@@ -215,27 +148,4 @@ def test_both_engines_meet_the_elliptic_function_and_a_heavier_arm_does_not():
 ])  # fmt: skip
 def test_a_pendulum_that_shows_nothing_is_left_out(mujoco, scene):
     result = swings(mujoco, **scene)
-    assert result.checks == [] and result.swings == {}
-
-
-def test_the_table_has_the_times_of_each_engine_and_the_largest_gain():
-    """Of a scene with a smaller model and of one that needs no run."""
-    cases, seconds = {case.name: case for case in ARM.cases}, {}
-    free, held = cases["zero, free"], cases["bent, held"]
-    planar = cases["elbow swing"]  # stands for the smaller model
-    for engine, steps, whole, small in (("tmt", 1024, 300e-9, 100e-9), ("mujoco", 128, 6000e-9, 4000e-9)):
-        for case, of, taken in ((free, free, whole), (held, held, whole), (free, planar, small)):
-            seconds[case.name, of.joints, engine] = steps * taken
-    of_scenes = (free, free), (free, planar), (held, held), (held, None)
-    models = [(scene.name, case) for scene, case in of_scenes]
-    result = ReductionResult("reduction", models=models, apart={(free.name, "tmt"): 1e-12})
-    needs.add_rows(result, ARM, seconds)
-    rows = {(row.scene, row.nv, row.engine): row for row in result.rows}
-    for engine, whole, small in (("tmt", 300.0, 100.0), ("mujoco", 6000.0, 4000.0)):
-        of_whole, of_small = rows[free.name, 3, engine], rows[free.name, 1, engine]
-        assert (of_whole.ns_per_step, of_whole.speedup) == pytest.approx((whole, 1.0))
-        assert (of_small.ns_per_step, of_small.speedup) == pytest.approx((small, whole / small))
-        assert rows[held.name, 0, engine].ns_per_step is None
-    assert [rows[free.name, nv, "tmt"].max_difference for nv in (1, 3)] == [1e-12, None]
-
-    assert needs.largest_gain(result.rows, 3) is rows[free.name, 1, "tmt"]
+    assert result.checks == result.notes == []

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from shutil import rmtree
 from types import SimpleNamespace
 
 import mujoco
@@ -10,18 +11,22 @@ import pytest
 from edited import setup_of_file
 
 import tmt
+from compare.cli.command_line import request
 from compare.core.text import say
-from compare.engines.mujoco.motion import SAMPLES, Simulation, apart
+from compare.engines.mujoco import ModelError
+from compare.engines.mujoco.motion import Simulation
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.smaller import Smaller, finished
 from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
+from compare.experiments.reduction.limits import compared_limits, stable_answers
 from compare.experiments.reduction.records import FrontierRow, ReductionResult
 from compare.experiments.reduction.scene import scene_of
-from compare.experiments.reduction.search import Answer, answer_within, take_out
+from compare.experiments.reduction.search import answer_within, take_out
 from compare.experiments.setup import Request
-from compare.robots.scene_file import SceneError, read_controls
+from compare.robots.scene_file import SceneError, read_controls, read_scenes
+from compare.run.reference import compared_with
 
 ARM = """<body name="{0}" pos="{1} 0 1"><joint name="{0} upper" axis="0 1 0" damping="0.1" range="-170 170"/>
 <geom size="0.05" mass="1" pos="0 0 -0.2"/><body name="{0} hand" pos="0 0 -0.4">
@@ -132,14 +137,91 @@ def test_the_idle_arm_is_locked_and_the_written_file_does_the_same_motion(two_ar
     assert [model.joint(i).name for i in range(model.njnt)] == ["left upper", "left lower"]
     assert model.nkey == 1 and model.key("home").qpos.shape == (2,) and model.site("left tip").id >= 0
     assert model.opt.timestep == best.dt
-    motion = Simulation(model, arms.motion, best.dt, best.integrator)()
-    error = apart(motion, arms.finely(arms.whole), arms.motion)
+    paths = Simulation(model, arms.motions, best.dt, best.integrator)()
+    error = arms.apart(paths, arms.finely(arms.whole))
     check = next(check for check in result.checks if check.quantity == "error of the smaller file")
     assert error == pytest.approx(check.value) and check.value == pytest.approx(best.error, rel=1e-3)
     digits = result.top[0].values["facts"]["digits"]
     assert abs(check.value - best.error) <= digits < 1e-5  # of six digits
     text = path.read_text(encoding="utf-8")
     assert "home" in text and "run, error 0.001" in text and "right upper" in text  # the comment
+
+
+SCENES = """[[scene]]
+name = "{} alone"
+torque = "servos"
+targets = [{}]
+duration = 0.2
+"""
+
+
+def test_a_reduction_holds_in_all_of_the_scenes(tmp_path):
+    """In each of them another arm moves: neither is locked, and the file has a keyframe of each."""
+    path, written = tmp_path / "scenes.toml", tmp_path / "smaller.xml"
+    both = SCENES.format("left", "20, 0, 0, 0") + SCENES.format("right", "0, 0, 20, 0")
+    for scenes in (both, both.partition('"right')[0].rpartition("[[")[0]):
+        path.write_text(scenes)
+        setup, result = setup_for(TWO_ARMS, write=str(written)), ReductionResult("reduction")
+        setup = replace(setup, robot=setup.robot.with_scenes(read_scenes(path, setup.robot)))
+        of_file.add(result, setup, setup.reading)
+        assert [str(check) for check in result.checks if not check.passed] == []
+        judged = [check.scene for check in result.checks if check.quantity.startswith("error")]
+        model = mujoco.MjModel.from_xml_path(str(written))
+        assert judged == [model.key(key).name for key in range(model.nkey)]
+        assert model.njnt == (4 if scenes is both else 2)
+    assert judged == ["left alone"]
+
+
+PYRAMID = "\n".join(f"v {place}" for place in ("0.1 0 0", "-0.1 0.1 0", "-0.1 -0.1 0", "0 0 0.2"))
+FALLS = """<mujoco><compiler meshdir="parts"/><asset><mesh file="tip.obj"/><mesh name="other" file="deep/tip.obj"/></asset>
+<worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 0 0.01"><freejoint/><geom type="mesh" mesh="tip" mass="1"/>
+</body><body pos="1 0 0.01"><freejoint/><geom type="mesh" mesh="other" mass="1"/></body></worldbody></mujoco>"""
+
+
+def test_the_written_file_is_moved_with_its_meshes(tmp_path):
+    for folder in ("parts", "parts/deep", "written"):
+        (tmp_path / folder).mkdir()
+    for part in ("tip.obj", "deep/tip.obj"):
+        (tmp_path / "parts" / part).write_text(f"{PYRAMID}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n")
+    (tmp_path / "whole.xml").write_text(FALLS)
+    result = answered(tmp_path / "whole.xml", write=str(tmp_path / "written" / "smaller.xml"))
+    assert [str(check) for check in result.checks if not check.passed] == []
+    rmtree(tmp_path / "parts")
+    (tmp_path / "written").rename(tmp_path / "elsewhere")
+    model = mujoco.MjModel.from_xml_path(str(tmp_path / "elsewhere" / "smaller.xml"))
+    assert model.nmesh == 2
+    assert "smaller_assets" in say(result.top[0])
+
+
+@pytest.mark.parametrize(
+    "place, message", [("arms.xml", "of the robot itself"), ("none/small.xml", "no such folder")]
+)
+def test_what_cannot_be_written_is_refused_at_once(tmp_path, place, message):
+    path = tmp_path / "arms.xml"
+    path.write_text(TWO_ARMS)
+    options = request(["reduction", "--mjcf", str(path), "--write", str(tmp_path / place)])
+    with pytest.raises(ModelError, match=message):
+        compared_with(None, str(path)).request_of(options)
+
+
+PULLED = """<mujoco><worldbody><body name="hand" mocap="true" pos="0.3 0 1"/><body name="arm" pos="0 0 1">
+<joint name="arm" axis="0 1 0" damping="1"/><geom size="0.05" pos="0.3 0 0"/></body>
+<body pos="2 0 0"><joint name="still" axis="0 0 1" damping="1"/><geom size="0.05" pos="0.3 0 0"/></body></worldbody><equality>
+<connect body1="hand" body2="arm" anchor="0 0 0"/></equality><keyframe><key name="up" mpos="0.2 0 1.3"/></keyframe></mujoco>"""
+
+
+def test_a_body_that_is_moved_from_outside_is_where_the_keyframe_has_it(tmp_path):
+    """It pulls the arm up, also in the written file."""
+    path, turned = tmp_path / "smaller.xml", []
+    assert all(check.passed for check in answered(PULLED, write=str(path)).checks)
+    for model in (mujoco.MjModel.from_xml_string(PULLED), mujoco.MjModel.from_xml_path(str(path))):
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        while data.time < 0.5:
+            mujoco.mj_step(model, data)
+        turned.append(data.joint("arm").qpos[0])
+    assert turned[0] == pytest.approx(turned[1], abs=1e-3) and turned[0] < -0.5
+    assert model.njnt == 1
 
 
 def test_what_the_scene_used_is_a_table(two_arms):
@@ -157,9 +239,10 @@ def test_each_kind_is_taken_out_of_what_the_kinds_before_it_have_left(two_arms):
 
 
 def test_the_smaller_file_starts_where_the_motion_does():
-    lifted = TWO_ARMS.replace('qpos="0 0 0 0"', 'qpos="0.1 0 0 0" ctrl="0.3 0 0 0 0"')
-    arms = scene(lifted, controls=waves("unused"))
-    key = finished(arms.whole, arms.motion, 0.002, "Euler").model.key(0)
+    arms = scene(
+        TWO_ARMS.replace('qpos="0 0 0 0"', 'qpos="0.1 0 0 0" ctrl="0.3 0 0 0 0"'), controls=waves("unused")
+    )
+    key = finished(arms.whole, arms.motions, 0.002, "Euler").model.key(0)
     assert (key.name, key.qpos[0], key.ctrl[0]) == ("home", 0.1, 0.3)
 
 
@@ -171,7 +254,7 @@ def test_the_result_goes_to_the_process_that_draws(two_arms):
 
 def test_the_equations_of_the_smaller_model_are_those_of_tmts_lock(two_arms):
     result, path = two_arms
-    where = "home, 2 joints locked"
+    where = "home, joints locked: 2"
     quantities = {check.quantity for check in result.checks if check.scene == where}
     assert quantities == {f"{name}, lock of tmt to the smaller model" for name in ("Mbar", "bias")}
     whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, ReductionResult("reduction")
@@ -184,11 +267,13 @@ def test_a_file_beyond_the_error_fails(two_arms):
     row = two_arms[0].top[0].values["facts"]["whole"]
     heavier = Smaller(arms.whole.spec.copy())
     heavier.spec.body("left hand").geoms[0].mass *= 1.5
+    heavier = Smaller(heavier.spec)
     for share, free, written, passed in (
         (1.01, arms.whole, arms.whole, True), (0.99, heavier, arms.whole, False), (1.01, heavier, heavier, False),
     ):  # fmt: skip
-        result, answer = ReductionResult("reduction"), Answer(share * row.error, row, at_own_step=False)
-        of_file.add_checks(result, arms, free, {}, answer, arms.whole, written.text())
+        result = ReductionResult("reduction")
+        answer = SimpleNamespace(row=row, allowed=share * row.error, at_own_step=False)
+        of_file.add_checks(result, arms, free, {}, answer, arms.whole, written)
         verdicts = {check.quantity: check.passed for check in result.checks}
         assert verdicts["error of the smaller file"] is passed
         assert verdicts["motion without what is not used"] is passed
@@ -198,7 +283,7 @@ def test_a_file_beyond_the_error_fails(two_arms):
 def test_a_robot_that_stands_starts_at_its_rest(stiffness, name, moves):
     """It sinks by 10 mm, or by half a meter: that is what it does."""
     stands = scene(STANDS.format("plate", stiffness))
-    assert stands.motion.name == name
+    assert stands.name == name
     assert (stands.use.ranges["plate"] > of_file.STILL) is moves
 
 
@@ -211,7 +296,7 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
     assert [group.predicted for group in groups] == sorted(group.predicted for group in groups)
     small = search.locked(hand.whole, {name: hand.use.middle[name] for name in ("thumb", "thumb tip")})
     assert (small.model.nv, small.model.ntendon, small.model.nu) == (2, 0, 2)
-    assert apart(hand.run(small), hand.run(hand.whole), hand.motion) < 0.01
+    assert hand.apart(hand.run(small), hand.run(hand.whole)) < 0.01
     result = answered(HAND, controls=waves("index"), error=1e-2)
     assert {"thumb", "thumb tip"} <= {row.joint for row in result.tables["reduction_joints"] if row.locked}
     assert "index" not in {row.joint for row in result.tables["reduction_joints"] if row.locked}
@@ -220,8 +305,9 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
 
 
 def test_after_a_joint_that_costs_too_much_others_are_tried():
-    locks = SimpleNamespace(groups=range(4), error=lambda groups: float(2 in groups))
-    assert search.Locks.within(locks, 0.5) == {0, 1, 3}
+    locks = SimpleNamespace(order=range(4), error=lambda groups: float(2 in groups))
+    locks.first = lambda count: frozenset(range(count))
+    assert search.Locks.within(locks, 0.5) == {0, 1, 3} and search.Locks.within(locks, 1.0) == {0, 1, 2, 3}
 
 
 def test_the_prediction_is_the_movement_times_the_coupling_through_the_mass_matrix():
@@ -229,8 +315,8 @@ def test_the_prediction_is_the_movement_times_the_coupling_through_the_mass_matr
     arms = scene(HAND, controls=waves("index"))
     tree = arms.reading.tree
     (group,) = [group for group in search.groups_of(arms, arms.whole) if group.names == ["wrist"]]
-    path, expected = arms.run(arms.whole), 0.0
-    for q in path.q[:: len(path.q) // SAMPLES]:
+    expected = 0.0
+    for q in arms.positions(arms.whole):
         M = np.array(tmt.mass_matrix(q, model=tree))
         moved = np.abs(q[0] - arms.use.middle["wrist"][0])
         expected = max(expected, np.abs(np.linalg.solve(M[1:, 1:], M[1:, 0])).max() * moved)
@@ -240,11 +326,60 @@ def test_the_prediction_is_the_movement_times_the_coupling_through_the_mass_matr
 def test_where_everything_moves_and_touches_nothing_is_left_out():
     result = answered(TUMBLES, error=1e-9)
     answer = result.top[0].values["facts"]
-    assert not answer["names"] and not any(row.same_bits for row in answer["free"])
+    assert not answer["names"] and {row.kind for row in answer["free"] if row.same_bits} <= {
+        "division into islands"
+    }
     assert "nothing can be left out" in say(result.top[0])
     facts = answer | {"names": ["a"]}
     assert "nothing is gained at" in say(replace(result.top[0], values={"facts": facts}))
     assert all(check.passed for check in result.checks)
+
+
+# a stiff damper, which is at rest: RK4 is not stable at its own step, or beyond it
+DAMPED = """<mujoco><option integrator="RK4" timestep="{}"/><worldbody><body><joint name="hinge" axis="0 1 0" damping="1"/>
+<geom size="0.05" mass="0.1" pos="0 0 -0.1"/></body></worldbody><keyframe><key qvel="{}"/></keyframe></mujoco>"""
+
+
+def test_no_answer_is_a_step_that_is_unstable_at_rest():
+    """A robot that rests exactly stays at any step: its run shows nothing."""
+    rests = scene(DAMPED.format(1e-3, 0.0))
+    candidates = search.frontier(rests, search.Locks(rests, rests.whole), [1e-3], int)
+    candidates = [candidate for candidate in candidates if candidate.row.integrator == "RK4"]
+    for candidate in candidates:
+        candidate.row.gain = candidate.row.dt
+    (answer,) = stable_answers(rests, candidates, [1e-3])
+    assert max(candidate.row.dt for candidate in candidates) == 8e-3
+    (limit,) = compared_limits(rests, rests.whole, ["RK4"])[1:]
+    assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
+
+
+def test_bodies_that_the_file_fuses_are_fused_in_the_smaller_one_too():
+    """As those of a URDF: the whole file has one body less than is read of it."""
+    tool = '<body pos="0 0 -0.1"><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.2 0.3"/><geom size="0.01"/></body>'
+    fused = TWO_ARMS.replace("<mujoco>", '<mujoco><compiler fusestatic="true"/>').replace(
+        '<site name="left', tool + '<site name="left'
+    )
+    result = answered(fused, controls=waves("left upper"))
+    assert [str(check) for check in result.checks if not check.passed] == []
+    assert {row.joint for row in result.tables["reduction_joints"] if row.locked} >= {
+        "right upper",
+        "right lower",
+    }
+
+
+def test_a_file_whose_own_run_fails_is_not_judged():
+    result = answered(DAMPED.format(0.02, 1.0))
+    (check,) = result.checks
+    assert not check.passed and "own run fails" in str(check)
+
+
+def test_a_run_that_fails_is_infinitely_far(two_arms):
+    """From the time on where it fails; of two motions, one."""
+    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    paths, others = arms.run(arms.whole), arms.run(arms.whole)
+    assert arms.apart(paths, others) == 0.0
+    others[0].q[-1, 3] = np.nan
+    assert arms.apart(paths, others) == arms.apart(2 * paths, paths + others) == np.inf
 
 
 def row(gain, error, locked=0, own=None) -> FrontierRow:
@@ -256,9 +391,11 @@ WHOLE = row(1.0, 0.5, own=0.0)
 
 
 @pytest.mark.parametrize("rows, best, at_own_step", [
-    ([WHOLE, row(3.0, 1.0), row(9.0, 1.01)], 1, False), ([WHOLE, row(3.0, 1.01)], 0, True),  # within the error; none is
+    ([WHOLE, row(3.0, 1.0), row(9.0, 1.01)], 1, False), ([WHOLE, row(3.0, 1.01)], 0, False),  # within the error; none is
     ([WHOLE, row(3.1, 1.0), row(3.0, 0.5, 2)], 2, False), ([WHOLE, row(3.2, 1.0), row(3.0, 0.5, 2)], 1, False),
-    ([WHOLE, row(1.04, 0.5), row(2.0, 5.0, 3, own=1.0)], 2, True), ([WHOLE, row(2.0, 5.0, 3, own=1.01)], 0, True),
+    ([row(1.0, 1.01, own=0.0), row(3.0, 1.02)], 0, True),
+    ([WHOLE, row(2.7, 0.9), row(4.8, 2.0, own=0.1)], 2, True), ([WHOLE, row(5.2, 0.9), row(4.8, 2.0, own=0.1)], 1, False),
+    ([WHOLE, row(1.04, 0.5), row(2.0, 5.0, 3, own=1.0)], 2, True), ([WHOLE, row(2.0, 5.0, 3, own=1.01)], 0, False),
 ])  # fmt: skip
 def test_the_fastest_within_the_error_is_the_answer(rows, best, at_own_step):
     answer = answer_within(rows, 1.0)
@@ -267,11 +404,13 @@ def test_the_fastest_within_the_error_is_the_answer(rows, best, at_own_step):
 
 
 def test_recorded_controls_are_held_between_their_times():
-    recorded = {"time": np.array([0.0, 0.1, 0.3]), "left upper": np.array([1.0, 2.0, 3.0])}
-    arms = scene(TWO_ARMS, controls=recorded)
-    controls = arms.motion.controls(arms.whole.model, 0.05, 6)
+    arms = scene(
+        TWO_ARMS, controls={"time": np.array([0.0, 0.1, 0.3]), "left upper": np.array([1.0, 2.0, 3.0])}
+    )
+    (motion,) = arms.motions
+    controls = motion.controls(arms.whole.model, 0.05, 6)
     assert controls[:, 0].tolist() == [1.0, 1.0, 2.0, 2.0, 2.0, 2.0] and not controls[:, 1:].any()
-    assert arms.motion.duration == 0.3
+    assert motion.duration == 0.3
 
 
 @pytest.mark.parametrize("text, message", [

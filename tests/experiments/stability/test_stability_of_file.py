@@ -47,7 +47,7 @@ def test_growth_in_closed_form_within_a_ten_thousandth(result, growth, apart, pa
 
 @pytest.mark.parametrize("more, passed", [
     ({}, True), ({"predicted_dt": 0.0999, "stable_at_file_dt": False}, False), (NONE, True),
-    ({"observed_dt": 0.0947, "failing_dt": 0.103}, False), ({"own_dt": 0.0999}, False),  # runs have the last word
+    ({"observed_dt": 0.0947, "failing_dt": 0.103}, False), ({"observed_dt": 0.11, "failing_dt": 0.12}, True),  # runs decide
     ({"limit": "below", "predicted_dt": None, "stable_at_file_dt": False}, False),
 ])  # fmt: skip
 def test_a_step_is_stable_up_to_its_limit_unless_runs_show_otherwise(result, more, passed):
@@ -99,7 +99,7 @@ def answers_of(result):
 
 
 @pytest.mark.parametrize("more, default, told", [
-    ({"own_dt": 0.09, "predicted_dt": 0.3}, None, ["by_derivative"]),
+    ({"observed_dt": 0.09, "failing_dt": 0.12, "predicted_dt": 0.3}, None, ["by_derivative"]),
     ({"largest_push": 0.01, "finer_push": True}, None, ["push"]),
     ({"largest_push": 0.1, "finer_push": True}, None, []), ({"smooth_dt": 0.09}, None, ["friction"]),
     ({"smooth_dt": 0.09, "file_dt": 0.08}, None, []), ({}, {"predicted_dt": 1e-3}, [False]), ({}, {"predicted_dt": 3e-3}, []),

@@ -143,8 +143,7 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
     about = {"scene": HELD.name, "level": "open loop"}
     result.rows = [SimpleNamespace(**about, difference_over_band=used) for used in (0.25, None, 0.125)]
     _, fig, caption = figures_runs.draw_run(result, HELD)
-    assert caption.values["errors"] == {"TMT": 0.1, "MuJoCo": 0.2} and caption.values["share"] == 0.25
-    assert {at for _, at in caption.values["judged"]} == {2.5}
+    assert caption.values["share"] == 0.25 and {at for _, at in caption.values["judged"]} == {2.5}
     paths = found[0].paths
     for ax, name in ((fig.axes[0], "q"), (fig.axes[3], "v")):  # angles and rates of the first scheme
         ours, theirs = (getattr(paths[engine], name)[:, 0] for engine in ("tmt", "mujoco"))

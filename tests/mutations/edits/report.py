@@ -75,14 +75,14 @@ EDITS = (
     ("figures_runs", "draw_held", "result.errors[name]", "_0[::-1]", "the caption exchanges the engines"),
     ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
-    ("reduction.needs", "largest_gain", "max(smaller, *_1)", "min(smaller, *_1)", "the least gain is told as the best"),
     # of a file's motion
     ("reduction.search", "take_out", "trial if is_same else small", "trial", "what changes the motion is taken out"),
     ("reduction.search", "answer_within", "row.error <= allowed", "True", "any error is within what is allowed"),
-    ("reduction.search", "same_bits", "path.q.tobytes() == other.q.tobytes() and _1", "True", "every motion is the same"),
+    ("reduction.search", "same_bits", "bits[0] == bits[1]", "True", "every motion is the same"),
+    ("mujoco.motion", "apart", "np.isfinite(error)", "True", "a run that fails has no error"),
     ("mujoco.motion", "couplings", "np.diag(inverse)", "1.0", "the prediction has no coupling through M"),
     ("mujoco.motion", "Motion.controls", "_1 + EARLY", "_1 - EARLY", "a control acts a step too late"),
-    ("reduction.of_file", "add_checks", "apart(path, exact(scene.whole), motion)", "row.error", "the written file is not run"),
-    ("reduction.scene", "scene_of", "place.left <= NEAR_REST and _1", "True", "what falls starts where it lies"),
+    ("reduction.of_file", "add_checks", "scene.apart([path], [other])", "row.error", "the written file is not run"),
+    ("reduction.scene", "motion_of_posture", "place.left <= NEAR_REST and _1", "True", "what falls starts where it lies"),
     ("reduction.search", "Answer.is_gain", "self.row.gain >= AS_FAST", "True", "no gain is called one"),
 )  # fmt: skip
