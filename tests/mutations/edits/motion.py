@@ -68,9 +68,11 @@ EDITS = (
     ("source", "Source.bare_spec", "self.spec.compiler.settotalmass > 0.0", "False", "a total mass without meshes"),
     ("inventory", "usable_keys", "np.hstack(_1)", "m.key_qpos", "a keyframe may have infinite controls"),
     ("inventory", "contact_pairs", "[chosen, _1]", "[chosen]", "pairs that a file names do not touch"),
+    ("scene_file", "read_controls", "np.diff(times) > 0.0", "np.diff(times) > -1.0", "times of controls may stand"),
     # derivatives
     ("derivatives.ways", "Quantity.by_machine_code", "side_by_side(_1)", "self.by_numpy(subject, dt)", "no machine code"),
     ("derivatives.ways", "share_of_differences", "(_1 + left_out) / eps", "30 * _0", "rounding of differences x 30"),
+    ("derivatives.ways", "share_of_differences", "np.fmax(*terms)", "terms[0]", "one eps tells the truncation"),
     ("derivatives", "contact_rows", "(nudge, -nudge)", "(nudge, nudge)", "contacts are looked at on one side"),
     ("derivatives", "of_mujoco", "max(*_1)", "min(*_1)", "tmt is compared with MuJoCo's worse way"),
     ("derivatives", "add_costs", "1e6 * seconds", "1e3 * seconds", "a millisecond is called a microsecond"),
