@@ -191,12 +191,12 @@ class Step:
 
 def options_of(model: mujoco.MjModel, exact: bool) -> dict[str, float]:
     """The options of the steps of a model beside their length and their integrator."""
-    names = ("disableflags", "enableflags", "solver", "tolerance", "iterations", "ls_iterations")
+    names = ("solver", "tolerance", "iterations", "ls_iterations")
     options: dict[str, float] = {name: getattr(model.opt, name) for name in names}
-    options["disableflags"] |= bit("AUTORESET")
-    options["enableflags"] &= ~SLEEP  # a body that sleeps has no derivative
+    no_islands = bit("ISLAND") if exact else 0  # with islands the zones of the rows are not kept
+    options["disableflags"] = model.opt.disableflags | bit("AUTORESET") | no_islands
+    options["enableflags"] = model.opt.enableflags & ~SLEEP  # a body that sleeps has no derivative
     if exact:
-        options["disableflags"] |= bit("ISLAND")  # with islands the zones of the rows are not kept
         options["solver"] = mujoco.mjtSolver.mjSOL_NEWTON
         options |= {"tolerance": TOLERANCE, "iterations": ITERATIONS, "ls_iterations": LINE_SEARCH}
     return options
