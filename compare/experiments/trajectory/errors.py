@@ -89,7 +89,7 @@ def find_departures(result: TrajectoryResult, robot: Robot) -> None:
 
 @dataclass
 class EnergyRow(Row):
-    """The drift of the energy in a free run of a second."""
+    """The drift of the energy in a free run."""
 
     scene: str
     integrator: str
@@ -117,6 +117,26 @@ def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[i
                 numbers = number_or_none(drift), orders.get(engine)
                 rows.append(EnergyRow(case.name, method.name, DURATION / counts[-1], engine, *numbers))
     return result
+
+
+def find_energy(result: TrajectoryResult, mujoco: Engine) -> None:
+    """The drift of MuJoCo's energy in the free, undamped scenes of a file or a user, with the coarsest step."""
+    for case in {run.case.name: run.case for run in result.runs}.values():
+        if not case.is_free or "own" not in case.scene.tags or any(case.tree.damping):
+            continue
+        runs = [run for run in result.runs if run.case.name == case.name]
+        dt, drifts = max(run.dt for run in runs), dict[str, float | None]()
+        for run in [run for run in runs if run.dt == dt]:
+            path = run.paths["mujoco"]
+            energy = literal.energy(path.q, path.v, case.tree)
+            change = np.nan if path.ended is not None else float(np.abs(energy - energy[0]).max())
+            for method in mujoco.methods.values():
+                if method.scheme == run.scheme:
+                    drifts[method.name] = drift = number_or_none(change)
+                    result.tables["energy"].append(EnergyRow(case.name, method.name, dt, "mujoco", drift))
+        result.top.append(
+            result.finding("energy", scene=case.name, duration=case.duration, dt=dt, drifts=drifts)
+        )
 
 
 def largest_drift(case: Case, dynamics: Dynamics, method: str, count: int) -> float:
