@@ -30,9 +30,8 @@ def test_a_script_sweeps_the_gains_of_a_compiled_model():
 
 
 def test_rows_tell_of_the_robot_in_contact_and_in_the_air():
-    rows = compare.step_limits(
-        LEG.replace("<option", '<option gravity="0 0 -5"'), integrators=("Euler", "implicitfast")
-    )
+    light = LEG.replace("<option", '<option gravity="0 0 -5"')
+    rows = compare.step_limits(light, integrators=("Euler", "implicitfast"))
     assert [(row.surroundings, row.integrator) for row in rows] == [
         (where, name) for where in ("contact", "air") for name in ("Euler", "implicitfast")
     ]
@@ -71,10 +70,8 @@ def test_a_wrong_posture_is_one_line(asked):
 
 def test_postures_differ():
     text = two(HOLDING.replace("60", "600") + KEYS)
-    limits = [
-        compare.step_limits(text, posture=p, integrators=["Euler"])[0]
-        for p in (None, "low", "17.18873,-11.45916", (0, 90))
-    ]
+    postures = None, "low", "17.18873,-11.45916", (0, 90)
+    limits = [compare.step_limits(text, posture=p, integrators=["Euler"])[0] for p in postures]
     first, low, numbers, bent = (row.predicted_dt for row in limits)
     assert first == low == pytest.approx(numbers, rel=5e-3) and abs(bent / low - 1.0) > 0.05
 
@@ -104,13 +101,11 @@ def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
 
 def test_curves_have_the_growth_of_steps_and_of_runs():
     reading = read(hinge(20.0, 5.0))
-    found = answer(
-        postures_of(reading)[0], True, reading, Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)
-    )
+    asked = Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)
+    found = answer(postures_of(reading)[0], True, reading, asked)
     curve, limit = found.curves["Euler"], found.rows[0].predicted_dt
-    assert (
-        all((factor > 1.0) == (dt > limit) for dt, factor in curve.predicted) and curve.predicted[-1][1] > 1.5
-    )
+    assert all((factor > 1.0) == (dt > limit) for dt, factor in curve.predicted)
+    assert curve.predicted[-1][1] > 1.5
     seen = dict(curve.predicted)
     grown = [(dt, factor) for dt, factor in curve.observed if factor > 1.0]
     assert len(grown) > 2 and all(factor == pytest.approx(seen[dt], rel=1e-3) for dt, factor in grown)

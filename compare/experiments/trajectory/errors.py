@@ -128,8 +128,7 @@ def find_energy(result: TrajectoryResult, mujoco: Engine) -> None:
         dt, drifts = max(run.dt for run in runs), dict[str, float | None]()
         for run in [run for run in runs if run.dt == dt]:
             path = run.paths["mujoco"]
-            energy = literal.energy(path.q, path.v, case.tree)
-            change = np.nan if path.ended is not None else float(np.abs(energy - energy[0]).max())
+            change = np.nan if path.ended is not None else drift_of(path.q, path.v, case)
             for method in mujoco.methods.values():
                 if method.scheme == run.scheme:
                     drifts[method.name] = drift = number_or_none(change)
@@ -144,7 +143,12 @@ def largest_drift(case: Case, dynamics: Dynamics, method: str, count: int) -> fl
     motion = dynamics.run(*case.start, case.tau, DURATION / count, count, method)
     if not np.isfinite(motion.states).all():
         return np.nan
-    energy = literal.energy(motion.q, motion.v, case.tree)
+    return drift_of(motion.q, motion.v, case)
+
+
+def drift_of(q: np.ndarray, v: np.ndarray, case: Case) -> float:
+    """The largest change of the energy along a run, J."""
+    energy = literal.energy(q, v, case.tree)
     return float(np.abs(energy - energy[0]).max())
 
 

@@ -43,9 +43,8 @@ def judged(check, found, floor) -> dict[str, bool]:
 
 
 def advised(found) -> list[Row]:
-    return conclusions.advice(
-        SpeedResult("speed", rows=[run.row for run in found], floors={"bent, free": 1e-16})
-    )
+    rows = [run.row for run in found]
+    return conclusions.advice(SpeedResult("speed", rows=rows, floors={"bent, free": 1e-16}))
 
 
 @pytest.mark.parametrize("ours, theirs, verdict", [
