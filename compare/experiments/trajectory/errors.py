@@ -125,17 +125,15 @@ def find_energy(result: TrajectoryResult, mujoco: Engine) -> None:
         if not case.is_free or "own" not in case.scene.tags or any(case.tree.damping):
             continue
         runs = [run for run in result.runs if run.case.name == case.name]
-        dt, drifts = max(run.dt for run in runs), dict[str, float | None]()
-        for run in [run for run in runs if run.dt == dt]:
-            path = run.paths["mujoco"]
-            change = np.nan if path.ended is not None else drift_of(path.q, path.v, case)
-            for method in mujoco.methods.values():
-                if method.scheme == run.scheme:
-                    drifts[method.name] = drift = number_or_none(change)
-                    result.tables["energy"].append(EnergyRow(case.name, method.name, dt, "mujoco", drift))
-        result.top.append(
-            result.finding("energy", scene=case.name, duration=case.duration, dt=dt, drifts=drifts)
-        )
+        dt = max(run.dt for run in runs)
+        by_scheme = {run.scheme: run.paths["mujoco"] for run in runs if run.dt == dt}
+        rows = []
+        for method in [method for method in mujoco.methods.values() if method.scheme in by_scheme]:
+            path = by_scheme[method.scheme]
+            drift = drift_of(path.q, path.v, case) if path.ended is None else None
+            rows.append(EnergyRow(case.name, method.name, dt, "mujoco", drift))
+        result.tables["energy"] += rows
+        result.top.append(result.finding("energy", rows=rows, duration=case.duration))
 
 
 def largest_drift(case: Case, dynamics: Dynamics, method: str, count: int) -> float:
