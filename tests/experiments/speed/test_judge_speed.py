@@ -57,6 +57,12 @@ def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
     assert judged(conclusions.check_same_schemes, found, 1e-10) == expected
 
 
+@pytest.mark.parametrize("difference, passes", [(127e-10, True), (129e-10, False)])
+def test_each_of_many_steps_may_round_by_half_an_eps(difference, passes):
+    found = [run_of("tmt", "rk4", 1e-3, 256), run_of("mujoco", "RK4", 1e-3 + difference, 256)]
+    assert [*judged(conclusions.check_same_schemes, found, 1e-10).values()] == [passes]
+
+
 @pytest.mark.parametrize("theirs, ours, left, found", [
     # errors that have stopped are of the size of rounding
     ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 63, {STOPPED: True, COMPARED: True}),

@@ -43,7 +43,7 @@ EDITS = (
     ("trajectory", "check_end", "min(_1 for q in _2)", "max(_1 for q in _2)", "it is enough that one run moves"),
     ("trajectory", "check_level", "movements.max()", "movements.min()", "the least difference is the largest"),
     ("trajectory.errors", "check_order", "finer <= _1", "True", "every drift is rounding"),
-    ("trajectory.errors", "largest_drift", "energy - energy[0]", "0.0 * energy", "no energy is lost"),
+    ("trajectory.errors", "drift_of", "energy - energy[0]", "0.0 * energy", "no energy is lost"),
     ("sub_blocks", "check_blocks", "closest(_1, _2)", "(0,)", "the first state is judged"),
     ("sub_blocks", "check_blocks", "FACTOR * EPS * scale", "100 * FACTOR * EPS * scale", "tolerance x 100"),
     ("smallest", "ZERO", "mpmath.mpf(10) ** _1", "mpmath.mpf(10)", "an acceleration below 10 rad/s2 is zero"),
