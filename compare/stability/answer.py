@@ -209,19 +209,16 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
 
 def runs_of(place: Place, found: Limit, integrator: str, longest: float) -> runs.Runs:
     """Runs from the rest of a place. longest: s, a step that the derivative calls stable; fine ones are finer."""
-    fine = min(longest / 2.0, max(longest / runs.FINER, runs.FINEST))
-
-    def creep_at(dt: float) -> float:
-        return max(place.creep, found.creep_near(dt))
-
-    return runs.Runs(place.model, place.rest, integrator, fine, found.first.rest.is_held, creep_at)
+    fine, first = min(longest / 2.0, max(longest / runs.FINER, runs.FINEST)), found.first
+    creep = max(place.creep, np.abs(first.rest.speeds).max(initial=0.0) if first.is_stable else 0.0)
+    return runs.Runs(place.model, place.rest, integrator, fine, first.rest.is_held, creep)
 
 
 def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     """What runs show; they have the last word."""
     shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
     if row.limit == "moving":
-        shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep_at=lambda dt: 0.0)
+        shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep=0.0)
         row.creep = shown.speed_after(runs.LIMIT_PUSHES[0], shown.fine, runs.lasting(shown.fine))
         row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
     row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)

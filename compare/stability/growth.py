@@ -65,10 +65,10 @@ def pushed(rest: Rest, push: float) -> np.ndarray:
     return rest.step.moved(rest.state, push_of(rest.step, rest.state, push))
 
 
-def push_of(step: Step, state: np.ndarray, push: float) -> np.ndarray:
-    """The deviation of a push, (n,); activations, which may have any unit, stay within their ranges."""
+def push_of(step: Step, state: np.ndarray, push: float, way: int = 0) -> np.ndarray:
+    """The deviation of a push, (n,); activations, which may have any unit, stay within their ranges. way: of its signs."""
     nv, by = step.model.nv, np.zeros(step.size)
-    signs = np.random.default_rng(SEED).choice([-1.0, 1.0], step.size)
+    signs = np.random.default_rng(SEED + way).choice([-1.0, 1.0], step.size)
     by[nv : 2 * nv] = push * signs[nv : 2 * nv]
     little = min(push, LITTLE)
     for place, (ahead, behind) in enumerate(step.sides(state, little)):

@@ -56,11 +56,6 @@ class Limit:
     def first(self) -> Tried:
         return self.tries[0]
 
-    def creep_near(self, dt: float) -> float:
-        """The largest speed at the rests of the search up to a step, s, and the next coarser one."""
-        near = [at.rest for at in self.tries if at.is_stable and at.dt <= COARSER * dt]
-        return float(max((np.abs(rest.speeds).max(initial=0.0) for rest in near), default=0.0))
-
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:
     """The rest near a state at a step, and its growth. drift: the rate of what grows by itself, 1/s."""

@@ -16,11 +16,12 @@ BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
 WITHIN = 1.065  # fold: how near they are where they differ elsewhere
 CURVE_STEPS, LEAST_SIZES = 400, 16  # of a run that shows how fast a push grows, and while it is small
 LIMIT_PUSHES = 1e-3, 1e-6  # rad/s or m/s: at the start of runs that show a limit
+WAYS = range(4)  # the signs of such a push, which decide where dry friction holds
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
 USUAL_PUSH = 0.1  # rad/s or m/s: what a robot in use meets
 CALM, CALMER = 1e-3, 0.05  # rad/s or m/s, and of the push: a speed at the end that is rest
 FAR = 0.5  # rad or m: from a rest to what is another one
-AS_CREEP, AS_FAST = 4.0, 2.0  # fold: of the creep, and of a run of fine steps
+AS_FAST = 4.0  # fold: of the creep, and of a run of fine steps
 THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
 FINER, FINEST = 8, 2e-4  # fold, and s: of the steps that show what the robot does by itself
 
@@ -56,7 +57,7 @@ class Runs:
     """Runs of a file, by its own solver, from where it rests.
 
     fine: a step at which the robot shows what it does by itself, s. is_held: at which positions forces depend on the movement,
-    (nv,). creep_at: the largest speed at rest at a step.
+    (nv,). creep: the largest speed at rest at a fine step, that of a coarse one may be a growth.
     """
 
     model: mujoco.MjModel
@@ -64,20 +65,20 @@ class Runs:
     integrator: str
     fine: float
     is_held: np.ndarray
-    creep_at: Callable[[float], float]
+    creep: float
 
     @cached_property
-    def speed_after(self) -> Callable[[float, float, float], float]:
+    def speed_after(self) -> Callable[..., float]:
         return lru_cache(self.run)
 
-    def run(self, push: float, dt: float, lasts: float) -> float:
+    def run(self, push: float, dt: float, lasts: float, way: int = 0) -> float:
         """The largest speed in the last eighth of a run after a push of all speeds; inf: it fails, or ends elsewhere.
 
         Elsewhere is also where a robot lies still that has fallen over.
         """
         step = Step(self.model, dt, self.integrator, exact=False)
         count, last = round(lasts / dt), 0.0
-        start = step.moved(self.state, push_of(step, self.state, push))
+        start = step.moved(self.state, push_of(step, self.state, push, way))
         number = 0
         for number, data in enumerate(step.run(start, count), 1):
             speed = float(np.abs(data.qvel).max(initial=0.0))
@@ -85,48 +86,53 @@ class Runs:
                 return np.inf
             last = max(last, speed) if 8 * number > 7 * count else 0.0
         moved = np.abs(distance(self.model, self.state, step.state()))[self.is_held].max(initial=0.0)
-        is_there = number == count and moved <= FAR + self.creep_at(dt) * lasts
+        is_there = number == count and moved <= FAR + self.creep * lasts
         return last if is_there else np.inf
 
-    def is_calm(self, push: float, dt: float) -> bool:
+    def is_calm(self, push: float, dt: float, way: int = 0) -> bool:
         """Whether the robot calms down after a push."""
-        allowed = max(CALM, CALMER * push, AS_CREEP * self.creep_at(dt))
-        return self.speed_after(push, dt, lasting(dt)) <= allowed
+        allowed = max(CALM, CALMER * push, AS_FAST * self.creep)
+        return self.speed_after(push, dt, lasting(dt), way) <= allowed
 
-    def survives(self, push: float, dt: float) -> bool:
+    def survives(self, push: float, dt: float, way: int = 0) -> bool:
         """Whether the robot calms down after a push, or moves on no faster than in a run of fine steps.
 
         So does what nothing brakes. That is not asked after a push larger than usual.
         """
-        speed = self.speed_after(push, dt, lasting(dt))
-        if self.is_calm(push, dt) or push > USUAL_PUSH or not np.isfinite(speed):
-            return self.is_calm(push, dt)
-        return speed <= AS_FAST * self.speed_after(push, self.fine, lasting(dt))
+        speed = self.speed_after(push, dt, lasting(dt), way)
+        if self.is_calm(push, dt, way) or push > USUAL_PUSH or not np.isfinite(speed):
+            return self.is_calm(push, dt, way)
+        return speed <= AS_FAST * self.speed_after(push, self.fine, lasting(dt), way)
 
-    def hold(self, dt: float) -> bool:
+    def hold(self, dt: float, way: int = 0) -> bool:
         """Whether the robot stays at rest after small pushes, or leaves it in runs of fine steps, too, as a drone does."""
         return all(
-            self.survives(push, dt) or self.speed_after(push, self.fine, lasting(dt)) == np.inf
+            self.survives(push, dt, way) or self.speed_after(push, self.fine, lasting(dt), way) == np.inf
             for push in LIMIT_PUSHES
         )
+
+    def all_hold(self, dt: float) -> bool:
+        """Whether the robot stays at rest whichever way it is pushed."""
+        return all(self.hold(dt, way) for way in WAYS)
 
     def limit(self, dt: float, predicted: float) -> tuple[float | None, float | None]:
         """The longest step at which runs hold and the shortest at which they fail, s.
 
-        They are sought upwards from a step in use, dt, to the first that fails, downwards where that fails itself: 3 % to either
-        side of a predicted limit if runs agree with it. None: none that holds, or that fails.
+        They are sought upwards from a step in use, dt, to the first that fails after a push of one way, then downwards to what
+        holds after all: 3 % to either side of a predicted limit if runs agree with it. None: none that holds, or that fails.
         """
         low, high = min(dt, BELOW * predicted), None
-        while not self.hold(low):
+        if self.hold(low):
+            for longer in upwards(low, predicted):
+                if not self.hold(longer):
+                    low, high = bisected(self.hold, low, longer, WITHIN)
+                    break
+                low = longer
+        while not self.all_hold(low):
             low, high = low / COARSER, low
             if low < SHORTEST:
                 return None, high
-        for longer in upwards(low, predicted) if high is None else ():
-            if not self.hold(longer):
-                high = longer
-                break
-            low = longer
-        return bisected(self.hold, low, high, WITHIN) if high else (low, None)
+        return bisected(self.all_hold, low, high, WITHIN) if high else (low, None)
 
     def largest_push(self, dt: float) -> tuple[float, bool | None]:
         """The largest push that is survived at a step, rad/s or m/s, 0.0: none; and whether fine steps bear no larger one.

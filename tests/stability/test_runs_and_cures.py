@@ -18,10 +18,10 @@ from compare.engines.mujoco.variants import (
 )
 from compare.stability import cures
 from compare.stability.control import controlled
-from compare.stability.growth import growth, has_grown
-from compare.stability.limits import Limit, Tried, tried
+from compare.stability.growth import growth, has_grown, push_of
+from compare.stability.limits import Tried, tried
 from compare.stability.motion import motion
-from compare.stability.runs import PUSHES, USUAL_PUSH, Runs, growth_in_run, upwards
+from compare.stability.runs import PUSHES, USUAL_PUSH, WAYS, Runs, growth_in_run, upwards
 
 WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
@@ -38,7 +38,7 @@ def runs_of(text, integrator="Euler"):
     """Runs of a model from its rest; fine steps are those of 0.25 ms."""
     place = place_of(text)
     held = rest_of(text, 2e-3, integrator).is_held
-    return Runs(place.model, place.rest, integrator, 2.5e-4, held, lambda dt: 0.0)
+    return Runs(place.model, place.rest, integrator, 2.5e-4, held, creep=0.0)
 
 
 @pytest.mark.parametrize("text, integrator", [
@@ -51,13 +51,6 @@ def test_runs_show_the_limit_within_three_hundredths(text, integrator):
     assert found.kind == "finite"
     below, above = runs_of(text, integrator).limit(2e-3, found.dt)
     assert (below, above) == (pytest.approx(0.97 * found.dt), pytest.approx(1.03 * found.dt))
-
-
-def test_runs_creep_as_the_rests_near_their_step():
-    rests = {dt: SimpleNamespace(state=dt, speeds=np.array([-dt])) for dt in (2.0, 6.0, 4.0, 3.0)}
-    tries = [SimpleNamespace(dt=dt, is_stable=dt != 4.0, rest=rest) for dt, rest in rests.items()]
-    found = Limit("finite", 3.0, None, SimpleNamespace(state=9.0), tries)
-    assert [found.creep_near(dt) for dt in (1.0, 1.4, 2.1, 4.1)] == [0.0, 2.0, 3.0, 6.0]
 
 
 @pytest.mark.parametrize("more, stable", [
@@ -121,12 +114,30 @@ def test_the_first_step_at_which_the_files_run_fails_is_found_wherever_the_deriv
         low, high = shown.limit(first, predicted)
         assert low < 1.03 * exact and 0.97 * exact < high < 1.066 * low
     swinging = replace(runs_of(hinge(20.0, 0.0)), state=start)
-    calm = [replace(swinging, creep_at=lambda dt, by=by: by).is_calm(1e-3, 2e-3) for by in (0.005, 0.02)]
+    calm = [replace(swinging, creep=by).is_calm(1e-3, 2e-3) for by in (0.005, 0.02)]
     assert calm == [False, True]
     assert runs_of(hinge(20.0, 5.0, integrator="implicitfast"), "implicitfast").limit(2e-3, np.inf) == (
         0.2,
         None,
     )
+
+
+class Directed(Runs):
+    """Runs that hold up to a step, s, of each way of a push."""
+
+    def run(self, push, dt, lasts, way=0):
+        return 0.0 if dt <= self.state[way] else np.inf
+
+
+@pytest.mark.parametrize(
+    "limits", [(0.1, 0.08, 0.08, 0.05), (0.1, 0.04, 0.02, 0.03), (0.1, 1e-3, 0.02, 0.02)]
+)
+def test_a_limit_holds_whichever_way_the_robot_is_pushed(limits):
+    low, high = Directed(None, np.array(limits), "Euler", 1e-4, None, 0.0).limit(2e-3, np.inf)
+    assert low <= min(limits) < high < 1.066 * low
+    rods = Step(place_of(two()).model, 2e-3, "Euler")
+    pushes = [push_of(rods, place_of(two()).rest, 1.0, way)[2:4] for way in WAYS]
+    assert np.linalg.matrix_rank(pushes) == 2 and (np.abs(pushes) == 1.0).all()
 
 
 def test_a_body_that_leaves_at_fine_steps_too_has_no_limit_of_the_step():

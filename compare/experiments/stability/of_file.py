@@ -11,7 +11,6 @@ from ...engines.mujoco.reading import Reading
 from ...robots.file import names_of_keys
 from ...stability.answer import Asked, PlaceAnswer, StepLimitRow, answer, integrators_at_rest
 from ...stability.control import MOST_PERIOD, controlled
-from ...stability.cures import Cure
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import MotionRow, motion
 from ...stability.place import MOST_POSTURES, Posture, posture_of, postures_of, standing_at
@@ -118,7 +117,7 @@ def add(result: StabilityResult, work: Work) -> None:
         places = list(step.answers)
         rows = [row for place in places for row in place.rows]
         add_checks(result, rows, AT_REQUESTED_STEP if step.is_requested else AT_OWN_STEP)
-        add_answer(result, rows, step, runs, [cure for place in places for cure in place.cures])
+        add_answer(result, places, step, runs)
         if not step.is_requested:
             result.tables["step_limits"] = rows
             result.growth = {place.rows[0].surroundings: place.curves for place in places if place.curves}
@@ -170,17 +169,14 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
 
 
 def add_answer(
-    result: StabilityResult,
-    rows: Sequence[StepLimitRow],
-    step: AtStep,
-    runs: Sequence[OwnRunRow],
-    cures: Sequence[Cure],
+    result: StabilityResult, places: Sequence[PlaceAnswer], step: AtStep, runs: Sequence[OwnRunRow]
 ) -> None:
     """The sentence about the step, the limits of all postures, and after it what matters. runs: with the worst outcome."""
 
     def tell(kind: str, **values: Any) -> None:
         result.top.append(result.finding(kind, OF, **values))
 
+    rows = [row for place in places for row in place.rows]
     asked, own = step.asked, in_use(rows, step.asked.integrator)
     worst = next((row for row in own if row.stable_at_file_dt is False), own[0] if own else None)
     here = [row for row in rows if worst and row.posture == worst.posture]
@@ -199,17 +195,16 @@ def add_answer(
     if step.is_requested:
         add_facts(tell, worst, None)
     else:
-        places: dict[tuple[str, str], list[StepLimitRow]] = {}
-        for row in rows:
-            places.setdefault((row.posture, row.surroundings), []).append(row)
-        for place in places.values() if len(rows) > 1 else ():
-            tell("limits_at", rows=place, up_to=LONGEST)
+        known = [place for place in places if place.rows]
+        for place in known if len(rows) > 1 else ():
+            tell("limits_at", rows=place.rows, up_to=LONGEST)
         is_default = (asked.dt, asked.integrator) == (DEFAULT_STEP, DEFAULT)
         add_facts(tell, worst, None if is_default else next(iter(as_it_stands), None))
-        for place in places.values():
-            if place[0].surroundings != "air" and is_told(place[0]):
-                tell("rest", row=place[0], far=FAR, creeps=CREEPS)
+        for first in (place.rows[0] for place in known):
+            if first.surroundings != "air" and is_told(first):
+                tell("rest", row=first, far=FAR, creeps=CREEPS)
     if worst and worst.stable_at_file_dt is False:
+        cures = next(place.cures for place in places if worst in place.rows)
         stable = [row.integrator for row in others if row.stable_at_file_dt]
         tell("cures", row=worst, integrators=stable, cures=cures)
 

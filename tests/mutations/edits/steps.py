@@ -28,6 +28,7 @@ EDITS = (
     ("stability.runs", "Runs.run", "_1 and moved <= _2", "_1", "what falls over and lies still has survived"),
     ("stability.runs", "Runs.largest_push", "self.speed_after(*_1) > _2", "False", "whatever throws a robot is its own"),
     ("stability.runs", "Runs.hold", "self.speed_after(*_1) == np.inf", "False", "a drone that nothing controls is not stable"),
+    ("stability.runs", "Runs.all_hold", "all(_1)", "self.hold(dt)", "a push of other signs is not tried"),
     ("stability.runs", "upwards", "BELOW * predicted", "LONGEST", "runs do not look below a limit"),
     ("stability.control", "Controlled.period", "max(0, _1)", "0", "a program's delay is none"),
     ("stability.control", "longest", "low, high = (middle, high) if _1 else (low, middle)", "low, high = (low, middle)",
