@@ -20,7 +20,7 @@ from compare.stability.control import controlled
 from compare.stability.growth import growth, has_grown, push_of
 from compare.stability.limits import tried
 from compare.stability.motion import motion
-from compare.stability.runs import PUSHES, USUAL_PUSH, WAYS, Runs, growth_in_run, upwards
+from compare.stability.runs import PUSHES, USUAL_PUSH, WAYS, Runs, upwards
 
 WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
@@ -50,15 +50,6 @@ def test_runs_show_the_limit_within_three_hundredths(text, integrator):
     assert found.kind == "finite"
     below, above = runs_of(text, integrator).limit(2e-3, found.dt)
     assert (below, above) == (pytest.approx(0.97 * found.dt), pytest.approx(1.03 * found.dt))
-
-
-def test_growth_in_a_run_is_that_of_the_step():
-    place = place_of(hinge(20.0, 5.0))
-    for dt in (0.021, 0.03):
-        at = tried(place.model, place.rest, dt, "Euler")
-        assert at.growth.factor > 1.05
-        assert growth_in_run(at.rest) == pytest.approx(at.growth.factor, rel=1e-3)
-    assert growth_in_run(tried(place.model, place.rest, 0.001, "Euler").rest) < 1.0
 
 
 @pytest.mark.parametrize(
