@@ -30,11 +30,8 @@ def exact(tree, q, qd, tau, qdd=None, step=None) -> Exact:
     """q (nq,), qd, tau (nv,): rad, rad/s, N m; qdd: by default that under tau; step: a method and dt, s."""
     with mpmath.workdps(DIGITS):
         arrays = {"q": q, "qd": qd, "tau": tau, "qdd": qdd, "dt": step and step[1:]}
-        given = {
-            name: [mpmath.mpf(float(x)) for x in values]
-            for name, values in arrays.items()
-            if values is not None
-        }
+        stated = {name: values for name, values in arrays.items() if values is not None}
+        given = {name: [mpmath.mpf(float(x)) for x in values] for name, values in stated.items()}
         many = exact_tree(tree, mpmath.mpf)
         return Exact(State(many, given, step=step and partial(one_step, method_named(step[0]), many)))
 

@@ -12,9 +12,7 @@ import compare
 import tmt
 from compare.agreement import Difference
 
-SECTION = re.compile(
-    r"^ *(?:Parameters|Attributes)\n +-+\n(.*?)(?=\n *\n +\w+\n +-+\n|\Z)", re.MULTILINE | re.DOTALL
-)
+SECTION = re.compile(r"(?ms)^ *(?:Parameters|Attributes)\n +-+\n(.*?)(?=\n *\n +\w+\n +-+\n|\Z)")
 FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
 OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Motion, Difference]
 OTHERS += [getattr(compare, name) for name in compare.__all__]

@@ -36,17 +36,18 @@ def flaws(figure) -> list[str]:
 
 def texts_of(figure, panels, flat) -> list[Text]:
     """All text that is seen."""
-    texts = [figure._supxlabel, figure._supylabel, figure._suptitle, *figure.texts]
+    texts = [*figure.texts, *(ax.title for ax in panels)]
     texts += [text for legend in figure.findobj(Legend) for text in legend.get_texts()]
-    for ax in panels:
-        texts += [ax.title, ax._left_title, ax._right_title]
     for ax in flat:
         texts += ax.texts
-        for axis in (ax.xaxis, ax.yaxis):
-            numbers = (label for tick in axis._update_ticks() for label in (tick.label1, tick.label2))
+        for k, axis in enumerate((ax.xaxis, ax.yaxis)):
+            low, high = sorted(axis.get_view_interval())  # numbers beyond it are not drawn
+            numbers = [*axis.get_ticklabels(), *axis.get_ticklabels(minor=True)]
+            places = [text.get_position()[k] for text in numbers]
+            seen = [low < place < high or np.isclose(place, (low, high), 1e-9, 0.0).any() for place in places]
+            numbers = [text for text, is_seen in zip(numbers, seen) if is_seen]
             texts += [axis.label, axis.get_offset_text(), *numbers]
-    texts = filter(None, dict.fromkeys(texts))
-    return [text for text in texts if text.get_visible() and text.get_text().strip()]
+    return [text for text in dict.fromkeys(texts) if text.get_visible() and text.get_text().strip()]
 
 
 def cut(box, page) -> bool:

@@ -140,8 +140,8 @@ def plot(result, name):
     return name, Figure(), "A caption."
 
 
-def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, monkeypatch):
-    names, log = ["mass", "speed", "stability", "derivatives"], []
+def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp_path, monkeypatch):
+    names, log = ["mass", "trajectory", "speed", "stability", "derivatives"], []
 
     def rows(name, setup):
         log.append(("rows", name))
@@ -155,8 +155,9 @@ def test_timed_experiments_come_last_and_are_drawn_after_all_timings(tmp_path, m
     setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
     sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
     assert log == [
-        ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"), ("rows", "speed"),
-        ("rows", "derivatives"), ("figures", "speed"), ("figures", "derivatives"),
+        ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),
+        ("rows", "trajectory"), ("figures", "trajectory"), ("rows", "speed"), ("rows", "derivatives"),
+        ("figures", "speed"), ("figures", "derivatives"),
     ]  # fmt: skip
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     for section_of_name, name in zip(sections, names):

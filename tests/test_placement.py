@@ -27,6 +27,8 @@ GAMMA, REF = 'name="gamma"', 'name="gamma" ref="1.5707963267948966"'
 ALONG = edited((GAMMA, f'{GAMMA} pos="0 0.07 0"'), ('name="alpha"', 'name="alpha" pos="0 -0.02 0"'))
 AS_LINKS = edited(('<joint name="alpha" type="hinge" axis="0 1 0"/>', ""), (UPPER, f"{YOKE}{UPPER}"),
                   ("</worldbody>", "</body></worldbody>"))  # fmt: skip
+BY_LINK = '<inertial pos="0 0 0" mass="1e-9" diaginertia="{0} {0} {0}"/>'
+TAG = '<body name="tag" pos="0.1 0 0"><inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/></body>'
 # the forearm hangs, and that is called 90 degrees
 HANGING = edited(
     (GAMMA, REF), (FOREARM, '<inertial pos="0 0 -0.15" mass="1.5" diaginertia="0.019 0.019 0.001"/>')
@@ -46,6 +48,8 @@ OTHERWISE = {  # how, the file, and what is said
     "welded": (edited((FOREARM, SPLIT)), "one (hand on forearm)"),
     "stand": (edited(("</worldbody>", STAND)), "fixed to the world, without motion: stand"),
     "massless": (AS_LINKS, "links without mass: yoke"),
+    "negligible": (AS_LINKS.replace(YOKE, YOKE + BY_LINK.format(1e-9)), "below 1e-6 of what it carries: yoke"),
+    "tag": (edited((FOREARM, FOREARM + TAG)), "below 1e-6 of what it carries: tag"),
 }  # fmt: skip
 
 
@@ -112,6 +116,13 @@ def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
     assert placement.along == ("rail",) and not placement.is_moved and not placement.is_turned
     assert np.abs(tmt.mass_matrix(q, placement.tree) - tmt.mass_matrix(q, tree)).max() < 1e-14
     assert placed(tree, read(wrist).tree).is_same
+
+
+# M[alpha][alpha] is 0.2445 kg m2 at the position zero
+@pytest.mark.parametrize("inertia, is_negligible", [(2.4e-7, True), (2.5e-7, False)])
+def test_the_mass_of_a_link_stands_for_none_up_to_a_millionth_of_what_it_carries(inertia, is_negligible):
+    source = Source(AS_LINKS.replace(YOKE, YOKE + BY_LINK.format(inertia))).joined()
+    assert (source.model.body("yoke").mass[0] == 0.0) == is_negligible
 
 
 def test_bodies_stay_one_where_joints_are_locked(tmp_path):

@@ -58,14 +58,11 @@ def test_its_figures_are_those_of_the_example():
         assert figure in text, figure
     rows = [row for row in table("evaluations") if row["quantity"] == "forward_dynamics"]
     times = [(row["implementation"], float(row["ns_per_state"] or "inf")) for row in rows]
-    of_both = (
-        [time for name, time in times if name == asked] for asked in ("MuJoCo, mj_forward", "compiled")
-    )
-    mujoco, compiled = map(min, of_both)
+    mujoco = min(time for name, time in times if name == "MuJoCo, mj_forward")
+    compiled = min(time for name, time in times if name == "compiled")
     assert f"is {mujoco / compiled:.0f} times as fast as mj_forward per evaluation" in README
-    rows = {
-        f"| {row['scene']}: {float(row['target_rad']):.0e} rad |": row for row in table("what_should_i_use")
-    }
+    uses = table("what_should_i_use")
+    rows = {f"| {row['scene']}: {float(row['target_rad']):.0e} rad |": row for row in uses}
     shown = [f"{said} {cheapest(row)} |" for said, row in rows.items() if said in README]
     assert len(shown) == 2 and all(line in README for line in shown)
 

@@ -175,10 +175,8 @@ def test_the_diagram_shows_the_imports_of_all_folders():
 
 def test_the_types_of_every_module_are_checked():
     """The options of mypy have no exception."""
-    assert (
-        "overrides"
-        not in tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["mypy"]
-    )
+    options = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "overrides" not in options["tool"]["mypy"]
 
 
 def test_ci_runs_the_commands_of_the_readme():

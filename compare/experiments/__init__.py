@@ -55,8 +55,8 @@ def skipped(name: str, robot: "Robot", engines: str | None = None) -> Finding | 
     """Why an experiment does not apply to a robot, or None; engines: of --engines, ALWAYS need no extra."""
     if robot.own and not EXPERIMENTS[name].serves_own:
         return Finding(name, "not_of_own")
-    asked = EXPERIMENTS[name].asks_of_own
-    if robot.own and asked and not {*asked} & {*robot.own}:
+    asked = EXPERIMENTS[name].asks_of_own if robot.own else None
+    if asked and not {*asked} & {*robot.own}:
         return Finding("shared", "nothing_given", {"asked": asked})
     takes_part = engines and "--engines" in EXPERIMENTS[name].options and {*engines.split(",")} <= {*ALWAYS}
     return None if takes_part else functions(name).skipped(robot)

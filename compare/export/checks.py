@@ -24,9 +24,7 @@ from .programs import Array, CProgram, NotRun, Program, States, WrongProgram
 
 ROUNDS = 20  # of timing
 STEPS = 1e-3, 1e-2  # dt, s
-OF_EXACT = (
-    1e-30  # rounding of the exact values, of the largest: a program may have 0.0 where their sums leave 1e-33
-)
+OF_EXACT = 1e-30  # of the largest exact value: what rounding may leave there of one that is zero
 OTHER = " (p)"  # after a quantity: with other values of the parameters
 
 

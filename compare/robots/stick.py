@@ -11,15 +11,14 @@ from tmt.derivation import method
 from .case import Robot
 from .coordinates import free_joints
 
+Sticks = list[tuple[int, int]]
 ELEVATION, AZIMUTH = 20.0, -70.0  # deg, of the camera
 _E, _A = np.radians([ELEVATION, AZIMUTH])
 RIGHTWARD = np.array([-np.sin(_A), np.cos(_A), 0.0])  # of the camera
 UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E)])
 
 
-def stick_figure(
-    robot: Robot, q: np.ndarray, crosses: bool = False
-) -> tuple[np.ndarray, list[tuple[int, int]]]:
+def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np.ndarray, Sticks]:
     """Points in the world, (times, points, 3) m, at positions q (times, nq), and the pairs of points with a stick.
 
     The landmarks; else the joints, and the centres of mass after the last joints; the slides of a free joint are left out.

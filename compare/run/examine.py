@@ -84,12 +84,10 @@ class Run:
     drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        is_large = (
-            self.setup.robot.coordinates.nv > MOST_SPEEDS
-        )  # the first answers come before any long work
-        last = ("kinematics", *TIMED) if is_large else TIMED
-        self.order = sorted(self.names, key=last.__contains__)
-        self.early = () if is_large else [name for name in self.names if not self.too_long(name)]
+        # the first answers come before any long work
+        is_large, last = self.setup.robot.coordinates.nv > MOST_SPEEDS, ("trajectory", "diagnosis", *TIMED)
+        self.order = sorted(self.names, key=(("kinematics", *last) if is_large else last).__contains__)
+        self.early = () if is_large else [name for name in self.order if not self.too_long(name)]
 
     def examined(self) -> Examined:
         (self.folder / "figures").mkdir()

@@ -134,8 +134,9 @@ class Asked(NamedTuple):
 
 def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> PlaceAnswer:
     """All that is asked of a posture as it stands, or in the air if that is another place: no rows if it is not."""
-    standing = standing_at(reading, posture)
-    place = standing if contacts else in_the_air_at(standing)
+    place: Place | None = standing_at(reading, posture)
+    if place and not contacts:  # its models take memory: it is not held longer
+        place = in_the_air_at(place)
     if place is None:
         return PlaceAnswer([], {}, [])
     rows, curves, changes = [], {}, []

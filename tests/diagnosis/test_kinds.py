@@ -225,10 +225,8 @@ def test_a_slip_of_the_recursion_is_named(place):
 def test_a_cause_in_parts_of_the_equations_alone():
     (M, velocity_terms, rest), other = parts(ARM), parts(replace(ARM, com=(ARM.com[0], (0.0, 0.0, 0.0))))
     assert first(of_parts(ARM, M, velocity_terms, other[2])) == ("CoM x of forearm in gravity alone", 0.0)
-    assert first(of_parts(ARM, M, other[1], rest)) == (
-        "CoM x of forearm in the velocity terms of h alone",
-        0.0,
-    )
+    place = "CoM x of forearm in the velocity terms of h alone"
+    assert first(of_parts(ARM, M, other[1], rest)) == (place, 0.0)
     assert first(of_parts(ARM, other[0], other[1], rest)) == ("CoM x of forearm, but not in gravity", 0.0)
     heavy = parts(replace(ARM, mass=(2.0, 1.5)))
     two = of_parts(ARM, other[0], other[1], heavy[2]).causes[0]
@@ -244,9 +242,8 @@ def test_h_by_the_derivatives_of_a_wrong_mass_matrix_is_the_same_cause():
 
 def test_a_slip_beside_a_number():
     tensor = np.diag(np.diag(TENSOR)[[2, 1, 0]]).tolist()
-    place, mass = first(
-        of_parts(ARM, *parts(replace(ARM, mass=(1.8, 1.5), inertia=(ARM.inertia[0], tensor))))
-    )
+    other = replace(ARM, mass=(1.8, 1.5), inertia=(ARM.inertia[0], tensor))
+    place, mass = first(of_parts(ARM, *parts(other)))
     assert (place, mass) == ("inertia of forearm, axes x and z exchanged and mass of upper arm", "1.8")
 
 

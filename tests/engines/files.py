@@ -12,10 +12,8 @@ from compare.robots.coordinates import Coordinates
 EPS = np.finfo(float).eps
 
 PLAIN = '<body name="b"><joint name="j"/><geom name="g" size="0.1" pos="0.2 0 0"/></body>'
-TWO = PLAIN.replace(
-    "</body>",
-    '<body name="c" pos="0.5 0 0"><joint name="k" axis="0 1 0"/><geom name="h" size="0.1"/></body></body>',
-)
+SECOND = '<body name="c" pos="0.5 0 0"><joint name="k" axis="0 1 0"/><geom name="h" size="0.1"/></body>'
+TWO = PLAIN.replace("</body>", f"{SECOND}</body>")
 
 TENDON = '<tendon><fixed name="t" {}><joint joint="j" coef="1"/><joint joint="k" coef="2"/></fixed></tendon>'
 URDF = """<robot name="r"><link name="base"/><link name="b"><inertial><origin xyz="0.1 0 0.2" rpy="0.4 -0.3 0.9"/>

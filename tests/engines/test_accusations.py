@@ -195,9 +195,8 @@ def test_pinocchio_has_no_springs_and_applies_no_damping(tmp_path):
     model, accelerations = pinocchio(path), []
     for damping in (0.0, 5.0):
         model.damping = np.array([damping])
-        accelerations.append(
-            pin.aba(model, model.createData(), np.array([0.5]), np.array([1.0]), np.zeros(1))
-        )
+        state = np.array([0.5]), np.array([1.0]), np.zeros(1)
+        accelerations.append(pin.aba(model, model.createData(), *state))
     assert accelerations[0] == accelerations[1] and not any("stiffness" in name for name in dir(model))
     reading = Outside("pinocchio").of(compared_with("model", str(path)).robot.case()).reading
     assert reading["lacking"] == ("damping", "stiffness") and "stiffness" not in reading["read"]

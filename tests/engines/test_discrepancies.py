@@ -40,8 +40,7 @@ def test_a_script_prints_what_stands_below_it(title, script, printed, tmp_path):
     subprocess.run(command, env=os.environ | SILENT, capture_output=True, check=True)
     said = file.read_text()
     if os.environ.get("RENEW"):
-        TEXT.write_text(
-            TEXT.read_text().replace(f"{script}```\n\n```text\n{printed}", f"{script}```\n\n```text\n{said}")
-        )
+        before, after = (f"{script}```\n\n```text\n{shown}" for shown in (printed, said))
+        TEXT.write_text(TEXT.read_text().replace(before, after))
     else:
         assert said == printed

@@ -86,9 +86,7 @@ def test_a_keyframe_states_controls_activations_or_neither(actuators, key, expec
     ('ctrl="0.5 0.25" act="0.1 0.2"', (0.1, 0.2)), ('ctrl="0.5 0.25"', (0.5, 0.25)),
 ])  # fmt: skip
 def test_a_run_starts_with_the_activations_of_its_keyframe_else_where_the_controls_lead(key, activations):
-    filters = (
-        '<general joint="j" dyntype="filter" dynprm="0.1"/><general joint="k" dyntype="filter" dynprm="0.1"/>'
-    )
+    filters = "".join(f'<general joint="{joint}" dyntype="filter" dynprm="0.1"/>' for joint in "jk")
     reading = read(text_of(filters, keys=KEYS.format(key)))
     step = Step(reading.model, 1e-3, "Euler")
     step.put(start_of(reading.model, reading.drive, "home", np.zeros(2)))
@@ -149,3 +147,12 @@ def test_actuators_act_in_their_own_scene_alone():
         wanted = case.tau - np.array(case.tree.position_gain) @ case.q if one is case else 0.0
         assert np.allclose(dynamics.other_forces(one.q, one.v)["actuators"], wanted, atol=1e-12)
         assert np.allclose(dynamics.acceleration(*one.start, one.tau), ours.acceleration(*one.start, one.tau))
+
+
+@pytest.mark.parametrize("option, why", [
+    ('actuatorgroupdisable="2"', "group 2"), ('actuatorgroupdisable="1"', ""), ("", ""),
+])  # fmt: skip
+def test_an_actuator_of_a_group_that_the_file_disables_is_off(option, why):
+    motor = '<actuator><motor name="a" joint="j" group="2"/></actuator>'
+    (actuator,) = read(mjcf(before=f"<option {option}/>", after=motor)).drive.actuators
+    assert why in actuator.off and bool(why) is bool(actuator.off)

@@ -17,9 +17,8 @@ from compare.engines.mujoco.parameters import stated_numbers
 from compare.judge.scale import EPS
 
 FEW = ("ant.xml", "humanoid.xml", "reacher.xml", "swimmer.xml")
-PUBLISHED = [
-    pytest.param(path, marks=[pytest.mark.slow] * (path.name not in FEW)) for path in gymnasium_files()
-]
+SLOW = [pytest.mark.slow]
+PUBLISHED = [pytest.param(path, marks=SLOW * (path.name not in FEW)) for path in gymnasium_files()]
 SOME_KINDS = st.lists(st.sampled_from(KINDS), min_size=1, max_size=3, unique=True)
 POINT = '<body name="point" pos="0.5 0 0"><inertial pos="0 0 0.1" mass="2" diaginertia="0 0 0"/></body>'
 SHEET = '<flexcomp name="f" type="grid" count="2 2 1" spacing=".1 .1 .1" dim="2" mass="1" rigid="true"/>'
@@ -107,11 +106,8 @@ def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
     """And MuJoCo's own mass matrix and bias are the same, whatever else the file has on."""
     text, rng = with_features(random_tree(seed, kinds, joints), seed), np.random.default_rng(seed)
     reading, model = compared(text, rng), mujoco.MjModel.from_xml_string(text)
-    dynamics, data, M = (
-        engine(reading).of(case_of(reading.tree)),
-        mujoco.MjData(model),
-        np.zeros((model.nv, model.nv)),
-    )
+    dynamics = engine(reading).of(case_of(reading.tree))
+    data, M = mujoco.MjData(model), np.zeros((model.nv, model.nv))
     q, v, _ = random_state(rng, reading.tree)
     data.qpos[dynamics.qpos], data.qvel[dynamics.dofs] = q, v
     mujoco.mj_forward(model, data)

@@ -41,9 +41,8 @@ def test_a_run_is_that_of_solve_ivp_by_this_method_with_this_tolerance(method, t
 
 
 def test_balls_are_followed_and_have_quaternions_of_length_1():
-    case = setup_of_file(PATHS["pendulum_ball"]).robot.case(
-        "let go", speed=(40.0, -30.0, 20.0, 10.0, 0.0, 50.0)
-    )
+    robot, speed = setup_of_file(PATHS["pendulum_ball"]).robot, (40.0, -30.0, 20.0, 10.0, 0.0, 50.0)
+    case = robot.case("let go", speed=speed)
     motion = ScipyDynamics(case).run(*case.start, case.tau, 1 / 64, 8, "DOP853", 1e-11)
     true = tmt.simulate(*case.start, case.tau, 1 / 1024, 128, method="dopri8", model=case.tree)
     assert np.abs(case.coordinates.difference(motion.q, true.q[::16])).max() < 1e-8

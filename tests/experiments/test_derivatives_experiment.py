@@ -112,6 +112,15 @@ def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
     assert max(share for one in every for share in one.shares.values()) <= 1.0
 
 
+@pytest.mark.parametrize("of_fourth", [8e3, 0.99e6])
+def test_where_two_terms_of_the_truncation_nearly_cancel_another_eps_tells_their_size(bent, of_fourth):
+    """Those in eps^2 and eps^4, at 1e-2 or 1e-3."""
+    *_, step = ways.quantities(bent, ("Euler",))
+    exact = step.exact_values(bent, DT)
+    values = {eps: exact.high + (eps**2 - of_fourth * eps**4) for eps in ways.SIZES}
+    assert 0.3 < ways.share_of_differences(values, exact, bent, step, DT) < 0.6
+
+
 DAMPED = """<mujoco><worldbody><body pos="0 0 1"><joint axis="0 1 0" damping="{0}"/>
 <inertial pos="0.1 0 0" mass="2" diaginertia="0.01 0.02 0.02"/><body pos="0.3 0 0"><joint axis="0 1 0" damping="{0}"/>
 <inertial pos="0.2 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""

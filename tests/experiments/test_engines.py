@@ -275,14 +275,10 @@ def test_axes_anchors_and_masses_are_those_by_which_the_bodies_move(number):
     right = tree_of_kinds(np.random.default_rng(3))
     model = OfTree(right)
     for name, values in model.numbers().items():
-        assert np.abs(values - model.stated[name]).max() <= 1e-13 * max(1.0, size_of(model.stated, name)), (
-            name
-        )
-    wrong = {
-        "axis": np.roll(right.axis, 1, axis=1),
-        "offset": np.add(right.offset, 0.1),
-        "mass": np.multiply(right.mass, 2.0),
-    }
+        size = max(1.0, size_of(model.stated, name))
+        assert np.abs(values - model.stated[name]).max() <= 1e-13 * size, name
+    wrong = {"axis": np.roll(right.axis, 1, axis=1), "offset": np.add(right.offset, 0.1)}
+    wrong["mass"] = np.multiply(right.mass, 2.0)
     model.tree = dataclasses.replace(right, **{number: wrong[number].tolist()})
     read = {"offset": "anchor"}.get(number, number)
     assert np.abs(model.numbers()[read] - model.stated[read]).max() > 1e-3

@@ -15,7 +15,8 @@ from compare.engines.outside import Outside, servos_of
 from compare.engines.outside.bodies import numbers_of
 from compare.engines.outside.model import FROM_FILE
 from compare.experiments.engines import batches, rows, servos
-from compare.experiments.engines.answer import cheapest_of
+from compare.experiments.engines.answer import cheapest_engine, cheapest_of
+from compare.experiments.engines.integrators import step_of
 from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult, MethodRow
@@ -107,9 +108,7 @@ def test_when_a_function_was_called_often_enough(taken, enough):
 
 
 def test_the_reference_of_engines_is_more_exact_than_doubles(setup):
-    case = dataclasses.replace(
-        ARM.cases[0], scene=dataclasses.replace(ARM.cases[0].scene, duration=1.0, dt=1.0 / 64)
-    )
+    case = ARM.cases[0].changed(duration=1.0, dt=1.0 / 64, judged=0.0)
     near, exact = reference(case), truth.reference(case)
     error = np.abs((near.high - exact.high) + (near.low - exact.low)).max()
     assert error < 1e-16 * np.abs(exact.high).max() and error <= 10.0 * near.apart + 1e-18
@@ -135,18 +134,28 @@ def row(method, error, seconds, alone=None):
 
 def test_the_cheapest_method_is_that_of_the_engines_own_time():
     """Just inside 1e-3; the time of the steps alone counts; a motion of 2 s; the floor is the smallest error."""
-    fields = cheapest_of(
-        [row("fast", 1.1e-3, 1.0), row("slow", 0.9e-3, 9.0), row("alone", 1e-3, 99.0, 4.0)], 2.0
-    )
+    rows = [row("fast", 1.1e-3, 1.0), row("slow", 0.9e-3, 9.0), row("alone", 1e-3, 99.0, 4.0)]
+    fields = cheapest_of(rows, 2.0)
     assert (fields["within_1e_3"], fields["within_1e_3_cost"]) == ("alone", 2000.0)
     assert fields["within_1e_6"] is None and (fields["floor"], fields["floor_method"]) == (0.9e-3, "slow")
 
 
+def test_the_cheapest_engine_is_that_of_the_least_cost_among_those_that_reach_an_error():
+    costs = {None: 1.0, "rk4": 3.0, "RK4": 2.0}
+    rows = [SimpleNamespace(within_1e_3=name, within_1e_3_cost=cost) for name, cost in costs.items()]
+    assert (
+        cheapest_engine(rows, "1e_3") == (rows[2], "RK4", 2.0) and cheapest_engine(rows[:1], "1e_3") is None
+    )
+
+
+@pytest.mark.parametrize("dt, step", [(0.003, 2.0**-9), (0.002, 2.0**-9), (0.1, 2.0**-7)])
+def test_a_single_step_is_a_power_of_two_and_no_longer_than_the_files(dt, step):
+    assert step_of(SimpleNamespace(reading=SimpleNamespace(dt=dt))) == step
+
+
 def test_engines_are_chosen_by_their_names():
     others = not_chosen("drake,mjx")
-    assert (
-        "drake" not in others and "mjx" not in others and "mjx_float32" in others and "mujoco" not in others
-    )
+    assert "mjx_float32" in others and not others & {"drake", "mjx", "mujoco"}
     with pytest.raises(Refused, match="draek is not an engine that reads"):
         not_chosen("draek")
 

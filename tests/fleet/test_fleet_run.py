@@ -164,10 +164,8 @@ def test_few_models_are_in_memory_at_a_time(fleet):
 def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_matched(fleet, tmp_path):
     right = PENDULUM.format(0.1)
     (tmp_path / "solution.xml").write_text(right)
-    files = {
-        "heavy.xml": right.replace("mass='1'", "mass='2'"),
-        "renamed.xml": right.replace("name='j' ", ""),
-    }
+    files = {"heavy.xml": right.replace("mass='1'", "mass='2'")}
+    files |= {"renamed.xml": right.replace("name='j' ", "")}
     files |= {"slide.xml": right.replace("axis", "type='slide' axis"), "right.xml": right}
     found = fleet(files, ["parameters"], reference="solution.xml")
     named = {

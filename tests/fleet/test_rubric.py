@@ -67,10 +67,8 @@ def test_all_checks_of_an_entry_must_pass_and_one_at_least_be_there(checks, poin
 
 
 def test_a_check_that_no_file_has_is_named_with_those_that_are_known(tmp_path):
-    rubric, row = (
-        read(tmp_path, "[mass]\nNbar = 1"),
-        report(tmp_path, "a.xml", [("mass", "Mbar", "bent", True)]),
-    )
+    rubric = read(tmp_path, "[mass]\nNbar = 1")
+    row = report(tmp_path, "a.xml", [("mass", "Mbar", "bent", True)])
     with pytest.raises(Refused, match="mass: no file has a check 'Nbar'; known: Mbar"):
         rubric.award([row], tmp_path)
     rubric.award([FileRow(file="a.xml", verdict=REFUSED)], tmp_path)  # no report: nothing is known

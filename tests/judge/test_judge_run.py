@@ -24,10 +24,8 @@ from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
 T = np.array([0.0, 0.5])
-ENDS = (
-    (INSIDE, None),
-    (OUTSIDE, 0.5),
-)  # shares of the energy that can be gained, and when a run over T diverges
+# shares of the energy that can be gained, and when a run over T diverges
+ENDS = ((INSIDE, None), (OUTSIDE, 0.5))
 MOVED = ("bent, free", 0.0), ("ball catch, held", [0.1, -0.2, 0.3]), ("thrown, no gravity", 0.0)
 
 

@@ -14,6 +14,5 @@ PATHS = {path.stem: path for path in sorted(Path(__file__).parent.glob("*.xml"))
 def gymnasium_files() -> list[Path]:
     """The MJCF files in the installed gymnasium, by name; none if it is not installed. Nothing of it is imported."""
     found = find_spec("gymnasium")
-    return (
-        sorted(Path(found.origin).parent.glob("envs/mujoco/assets/*.xml")) if found and found.origin else []
-    )
+    folder = Path(found.origin).parent if found and found.origin else Path("nowhere")
+    return sorted(folder.glob("envs/mujoco/assets/*.xml"))

@@ -63,14 +63,9 @@ def with_features(text: str, seed: int) -> str:
     """A text of random_tree with contacts, limits, friction, actuators, ties, springs of tendons, frames and options too."""
     rng, root = np.random.default_rng(seed), ET.fromstring(text)
     add_element(root, "compiler", angle="radian", eulerseq=rng.choice(["XYZ", "zyx"]), autolimits="true")
-    integrator, flag = (
-        rng.choice(["Euler", "RK4", "implicitfast"]),
-        rng.choice(["limit", "contact", "warmstart"]),
-    )
-    option = add_element(
-        root, "option", gravity=rng.uniform(-9, 9, 3), density=rng.choice([0, 1000]), integrator=integrator
-    )
-    add_element(option, "flag", **{flag: "disable"})
+    option = add_element(root, "option", gravity=rng.uniform(-9, 9, 3), density=rng.choice([0, 1000]))
+    option.set("integrator", rng.choice(["Euler", "RK4", "implicitfast"]))
+    add_element(option, "flag", **{rng.choice(["limit", "contact", "warmstart"]): "disable"})
     for body in [*root.iter("body")]:
         body.set("gravcomp", str(rng.choice([0, 0.5])))
         add_element(body, "geom", type="box", size=rng.uniform(0.05, 0.2, 3), euler=rng.uniform(-3, 3, 3))
@@ -82,13 +77,9 @@ def with_features(text: str, seed: int) -> str:
     for joint in [joint for joint in root.iter("joint") if joint.get("type") != "ball"]:
         joint.set("range", "-0.5 0.7")
         joint.set("frictionloss", str(rng.choice([0, 0.1])))
-        kind = {
-            "motor": {},
-            "position": {"kp": 9, "kv": 2},
-            "general": {"armature": 0.1, "gear": rng.uniform(1, 3)},
-        }
-        name = str(rng.choice([*kind]))
-        add_element(actuators, name, joint=joint.get("name"), **kind[name])
+        kinds = {"motor": {}, "position": {"kp": 9, "kv": 2}, "general": {"armature": 0.1, "gear": 3}}
+        kind = str(rng.choice([*kinds]))
+        add_element(actuators, kind, joint=joint.get("name"), **kinds[kind])
         add_element(ties, "joint", joint1=joint.get("name"))
         fixed = add_element(tendons, "fixed", stiffness=3, damping=0.5)
         add_element(fixed, "joint", joint=joint.get("name"), coef=2)

@@ -1,4 +1,4 @@
-"""python -m tests.mutations: make the program wrong in some 530 ways, and list those that no test notices.
+"""python -m tests.mutations: make the program wrong in some 570 ways, and list those that no test notices.
 
 Each edit is made in a copy of the project, and meets the tests of the default stage, those first that name what is edited.
 """

@@ -58,9 +58,8 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
     assert out.startswith("reference: model; ") and f"{ATTACK}\\nb.xml" in out.splitlines()[0]
     assert "<script" not in page
     policy = re.search(r'-Policy" content="([^"]+)"', page)[1]
-    assert (
-        policy.startswith("default-src 'none'; ") and "script-src" not in policy
-    )  # nothing is loaded or run
+    # nothing is loaded or run
+    assert policy.startswith("default-src 'none'; ") and "script-src" not in policy
 
 
 def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):

@@ -44,9 +44,8 @@ def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
     for name, sign, least, most in (("Euler", -1.0, 1.5, 10.0), ("implicitfast", 1.0, 0.1, 0.5)):
         air = (sign * kv + np.sqrt(kv**2 + 4.0 * m * kp)) / kp
         assert least < standing[name].dt / air < most
-        weightless = LEG.replace("<option", '<option gravity="0 0 0"').replace(
-            'name="foot"', 'contype="0" conaffinity="0"'
-        )
+        weightless = LEG.replace("<option", '<option gravity="0 0 0"')
+        weightless = weightless.replace('name="foot"', 'contype="0" conaffinity="0"')
         assert limit_of(weightless, name).dt == pytest.approx(air, rel=3e-3)
     for dt in (1e-3, 4e-3):
         rest = rest_of(LEG, dt)
@@ -104,9 +103,8 @@ def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     assert radius_apart(rest_of(LEG), place.tree) is not None
     others = [name for name in INTEGRATORS if name not in EVERY]
     assert all(radius_apart(rest_of(LEG, integrator=name), place.tree) is None for name in others)
-    touching = hinge(joint='range="-1 0" limited="true"').replace(
-        "<mujoco>", '<mujoco><compiler angle="radian"/>'
-    )
+    touching = hinge(joint='range="-1 0" limited="true"')
+    touching = touching.replace("<mujoco>", '<mujoco><compiler angle="radian"/>')
     assert radius_apart(rest_of(touching), place_of(touching).tree) is None
 
 
@@ -120,9 +118,8 @@ def test_no_closed_form_of_what_the_noslip_solver_changes(kind):
 
 
 def test_activations_are_left_out_of_rk4_on_both_sides_and_none_that_moves_with_the_joint():
-    turning = (
-        '<intvelocity joint="turn" kp="20" kv="5" actrange="-1 1"/>'  # its activation has the eigenvalue 1
-    )
+    # its activation has the eigenvalue 1
+    turning = '<intvelocity joint="turn" kp="20" kv="5" actrange="-1 1"/>'
     for actuator in (turning, '<dcmotor joint="turn" motorconst="0.8" resistance="2"/>'):
         text = hinge(joint='stiffness="9"', actuator=actuator)
         assert abs(radius_apart(rest_of(text, integrator="RK4"), place_of(text).tree)) < 1e-8

@@ -1,5 +1,6 @@
 """Where a model rests: what falls, is left, is told; and what limits its step there."""
 
+import mujoco
 import numpy as np
 import pytest
 from small import BOX, CASTER, INERTIA, KINDS, LEG, STANDING, hinge, limit_of, place_of, rest_of
@@ -41,6 +42,7 @@ def test_the_rest_depends_on_the_step_where_contacts_are_softened():
 
 def test_a_saddle_is_left_where_it_leads_to_a_rest():
     hanging = place_of(POLE.format(""))
+    assert not hanging.has_fallen  # its base is fixed
     assert abs(abs(hanging.moved[0]) - np.pi) < 0.1 and limit_of(POLE.format("")).kind == "none"
     stopped = place_of(POLE.format('range="-20 30" limited="true"'))
     assert abs(stopped.moved[0]) > 0.3
@@ -60,7 +62,7 @@ def test_what_falls_has_no_rest_and_one_in_the_air_has():
     assert falling.left == pytest.approx(9.81) and falling.surroundings == "free" and not falling.is_touching
     assert limit_of(STONE.format("")).kind == "no rest"
     assert in_the_air_at(falling).left < NEAR_REST
-    assert lying.is_touching and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
+    assert lying.has_fallen and lying.is_touching and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
     assert limit_of(STONE.format(FLOOR)).kind == "none"
     assert in_the_air_at(place_of(hinge())) is None  # nothing touches it, and it rests
 
@@ -98,6 +100,16 @@ def test_all_rows_of_a_contact_are_its_own(cone, counts):
     assert rows_at(rest.step, rest.state)[1].contact.tolist() == [-1]
 
 
+def test_the_steps_of_a_model_share_a_copy_and_each_has_its_own_options():
+    model = mujoco.MjModel.from_xml_string("<mujoco><option tolerance='1e-4'/></mujoco>")
+    exact, other = Step(model, 0.01, "Euler"), Step(model, 0.02, "RK4", exact=False)
+    assert exact.model is other.model is not model
+    for step, expected in ((exact, (0.01, 1e-15)), (other, (0.02, 1e-4))):
+        step.set_options()
+        assert (step.model.opt.timestep, step.model.opt.tolerance) == expected
+    assert (model.opt.timestep, model.opt.tolerance) == (0.002, 1e-4)
+
+
 def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():
     place = place_of(POLE.format("").replace('damping="0.05"', ""))
     step = Step(place.model, 1e-3, "Euler")
@@ -116,9 +128,8 @@ def test_a_posture_may_be_numbers():
 
 def test_what_bounces_is_not_in_the_air():
     """A light box on a stiff floor never rests at 2 ms: its floor stays, and the step is not stable."""
-    box = BOX.replace('mass="2"', 'mass="1e-6"').replace(
-        "<worldbody>", '<default><geom solref="-1e5 -100"/></default><worldbody>'
-    )
+    box = BOX.replace('mass="2"', 'mass="1e-6"')
+    box = box.replace("<worldbody>", '<default><geom solref="-1e5 -100"/></default><worldbody>')
     place = place_of(box)
     assert place.surroundings == "contact"
     row, _ = limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"], in_runs=True))
@@ -131,3 +142,5 @@ def test_a_loose_object_that_moves_on_is_named_and_hides_nothing():
     place = place_of(text)
     assert place.held_objects == "ball" and not place_of(hinge()).held_objects
     assert limit_of(text).dt == pytest.approx(limit_of(hinge(20.0, 5.0)).dt, rel=3e-3)
+    tail = '<body><joint axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></body></worldbody>'
+    assert not place_of(text.replace("</body></worldbody>", tail)).held_objects  # a robot is none

@@ -161,9 +161,8 @@ def test_who_cannot_wait_has_it_prepared(monkeypatch):
     assert set(answers.answers_of(tree).prepared) == {"bias"}
     with pytest.raises(ValueError, match="'weight'"):
         tmt.prepare(tree, "weight")
-    assert tmt.prepare(tree) is None and set(answers.answers_of(tree).prepared) == {
-        x for x in PLAIN if not QUANTITIES[x].is_long
-    }
+    assert tmt.prepare(tree) is None
+    assert {*answers.answers_of(tree).prepared} == {x for x in PLAIN if not QUANTITIES[x].is_long}
     monkeypatch.setattr(literal, "acceleration", None)
     assert np.isfinite(tmt.acceleration(Z[:1], Z[:1], Z[:1], tree)).all()
 

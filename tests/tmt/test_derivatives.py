@@ -64,11 +64,8 @@ def test_derivatives_are_those_of_31_digits_entry_by_entry(name, rng):
     q, qd, tau = random_states(rng, tree, 3)
     qdd, by = tmt.acceleration(q, qd, tau, tree), tmt.derivatives(q, qd, tau, tree)
     entries = Entries(tree, q, qd)
-    scales = {
-        "derivatives": entries.derivatives(tau, qdd, by),
-        "inverse_dynamics_derivatives": entries.force_rates(tau),
-    }
-    for quantity, scale in scales.items():
+    scales = entries.derivatives(tau, qdd, by), entries.force_rates(tau)
+    for quantity, scale in zip(("derivatives", "inverse_dynamics_derivatives"), scales):
         truth = exact_of_many(tree, quantity, q, qd, tau)
         compiled = Evaluator(tree, quantity).of_any(q, qd, tau)
         for found in (getattr(tmt, quantity)(q, qd, tau, tree), compiled):
@@ -133,10 +130,8 @@ def test_stages_that_are_solved_for_have_the_derivatives_of_50_digits(rng):
 
 def with_site(tree, joint, rng):
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    offset, turn = rng.normal(size=(1, 3)), [turn * np.linalg.det(turn)]
-    return dataclasses.replace(
-        tree, site_names=["tool"], site_joint=[joint], site_offset=offset, site_turn=turn
-    )
+    turns = {"site_offset": rng.normal(size=(1, 3)), "site_turn": [turn * np.linalg.det(turn)]}
+    return dataclasses.replace(tree, site_names=["tool"], site_joint=[joint], **turns)
 
 
 def test_a_frame_moves_as_its_jacobian_says(rng):

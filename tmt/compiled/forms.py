@@ -114,8 +114,8 @@ def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | 
 
     if name == "acceleration":
         return shortest("quantity", sizes, by_dynamics, all_dynamics(tree))
-    long_forms = (*FORMS[: n < MANY], *LONG_FORMS)  # the first by dual numbers
-    return shortest("quantity", sizes, in_form, long_forms if row.is_long else FORMS)
+    some = (*FORMS[: n < MANY], *LONG_FORMS) if row.is_long else FORMS  # the first by dual numbers
+    return shortest("quantity", sizes, in_form, some if row.has_forms else some[:1])
 
 
 def values_in(form: Form, tree: AnyTree, name: str, arrays: Mapping[str, Values]) -> Values:

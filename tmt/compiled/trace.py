@@ -27,7 +27,6 @@ FOLD: dict[str, Callable[..., Scalar]] = {
     "sin": folded(math.sin, sin), "cos": folded(math.cos, cos), "sqrt": folded(math.sqrt, sqrt),
     "arctan": folded(math.atan, arctan),
 }  # fmt: skip
-FUNCTIONS = ("sqrt", "arctan")
 LEAVES = ("input", "number")
 
 
@@ -42,10 +41,10 @@ class Tape:
 
     def node(self, operation: str, *arguments: Any) -> "Expression":
         key = (operation, arguments)
-        if key not in self.index:
-            self.index[key] = len(self.nodes)
+        i = self.index.setdefault(key, len(self.nodes))
+        if i == len(self.nodes):
             self.nodes.append(key)
-        return Expression(self, self.index[key])
+        return Expression(self, i)
 
     def inputs(self, *names: int | str) -> list["Expression"]:
         return [self.node("input", name) for name in names]
@@ -123,18 +122,15 @@ class Tape:
         return None
 
     def apply(self, operation: str, *operands: Scalar) -> "Expression":
-        values = [self.lift(operand) for operand in operands]
+        values = [x if type(x) is Expression else self.lift(x) for x in operands]
         numbers = [value.number for value in values]
         if None not in numbers:
             return self.lift(FOLD[operation](*numbers))
+        if operation in RULES:
+            return RULES[operation](self, *values)
         if operation in ("sin", "cos"):
             return self.node("item", self.node("sincos", values[0].i).i, ("sin", "cos").index(operation))
-        if operation in FUNCTIONS:
-            return self.node(operation, values[0].i)
-        if operation == "neg":
-            return self.negative(values[0])
-        rules = {"+": self.add, "-": self.subtract, "*": self.multiply, "/": self.divide}
-        return rules[operation](*values)
+        return self.node(operation, values[0].i)
 
     def fused(self, order: list[int], outputs: list["Expression"]) -> dict[int, int]:
         """For each sum or difference that takes one up, a product that is used nowhere else."""
@@ -170,18 +166,21 @@ class Tape:
         return arguments[:1] if operation == "item" else arguments
 
 
+RULES: dict[str, Callable[..., "Expression"]] = {
+    "+": Tape.add, "-": Tape.subtract, "*": Tape.multiply, "/": Tape.divide, "neg": Tape.negative,
+}  # fmt: skip
+
+
 class Expression:
-    __slots__ = ("i", "tape")
+    """A node of a tape. number: its value, if it is known without running, else None."""
+
+    __slots__ = ("i", "number", "tape")
     __array_ufunc__ = None
 
     def __init__(self, tape: Tape, i: int):
         self.tape, self.i = tape, i
-
-    @property
-    def number(self) -> Scalar | None:
-        """The value, if it is known without running: else None."""
-        operation, arguments = self.tape.nodes[self.i]
-        return arguments[0] if operation == "number" else None
+        operation, arguments = tape.nodes[i]
+        self.number: Scalar | None = arguments[0] if operation == "number" else None
 
     @property
     def negated(self) -> "Expression | None":
@@ -195,9 +194,10 @@ class Expression:
 
     def apply(self, operation: str, *values: Scalar) -> Scalar:
         """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
-        if all(isinstance(value, (Expression, Real)) for value in values):
-            return self.tape.apply(operation, *values)
-        return NotImplemented
+        for value in values:
+            if type(value) not in SCALARS and not isinstance(value, Real):
+                return NotImplemented
+        return self.tape.apply(operation, *values)
 
     def __neg__(self) -> Scalar:
         return self.apply("neg", self)
@@ -225,5 +225,6 @@ class Expression:
         return self.apply("/", other, self)
 
 
+SCALARS = (Expression, float, int)
 for name, function in (("sin", sin), ("cos", cos), ("sqrt", sqrt), ("arctan", arctan)):
     function.register(Expression, lambda x, name=name: x.tape.apply(name, x))

@@ -163,46 +163,50 @@ class Quantity(NamedTuple):
     # what its full name says after a colon, as in frame_pose:hand and step_derivatives:rk4: a frame or a method
     argument: str = ""
     is_long: bool = False  # it has many operations: it is compiled only where it is asked for by name
+    has_forms: bool = True  # it follows from Mbar or h, whose sums have several orders
     title: str = ""  # what it is, where no public function of its name says so
 
 
 Q, QD, TAU, QDD = ("q",), ("q", "qd"), ("q", "qd", "tau"), ("q", "qd", "qdd")
 BY_STATE = "dqdd_dq", "dqdd_dqd", "dqdd_dtau", "dtau_dq", "dtau_dqd"
 QUANTITIES = {
-    "com_positions": Quantity(Q, ("m", 3), "m", lambda s: [list(b.x) for b in s.bodies]),
-    "angular_velocities": Quantity(QD, ("m", 3), "rad/s", lambda s: [list(b.omega) for b in s.bodies]),
+    "com_positions": Quantity(Q, ("m", 3), "m", lambda s: [list(b.x) for b in s.bodies], has_forms=False),
+    "angular_velocities": Quantity(
+        QD, ("m", 3), "rad/s", lambda s: [list(b.omega) for b in s.bodies], has_forms=False
+    ),
     "jacobians": Quantity(
         Q, (2, "m", 3, "nv"), "m/rad; 1",
-        lambda s: [[list(zip(*b.T)) for b in s.bodies], [list(zip(*b.B)) for b in s.bodies]], ("T", "B"),
+        lambda s: [[list(zip(*b.T)) for b in s.bodies], [list(zip(*b.B)) for b in s.bodies]],
+        ("T", "B"), has_forms=False,
     ),
     "convective_terms": Quantity(
         QD, (2, "m", 3), "m/s2; rad/s2",
         lambda s: [[list(b.v_conv) for b in s.bodies], [list(b.w_conv) for b in s.bodies]],
-        ("v_conv", "w_conv"),
+        ("v_conv", "w_conv"), has_forms=False,
     ),
     "mass_matrix": Quantity(Q, ("nv", "nv"), "kg m2", lambda s: s.mass_matrix),
     "inverse_mass_matrix": Quantity(Q, ("nv", "nv"), "1/(kg m2)", lambda s: s.factors.inverted()),
     "bias": Quantity(QD, ("nv",), "N m", lambda s: s.bias),
     "gravity_balance": Quantity(Q, ("nv",), "N m", lambda s: s.gravity_balance),
-    "spring_torque": Quantity(Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q)),
+    "spring_torque": Quantity(Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q), has_forms=False),
     "acceleration": Quantity(TAU, ("nv",), "rad/s2", lambda s: s.acceleration),
     "inverse_dynamics": Quantity(QDD, ("nv",), "N m", lambda s: s.inverse_dynamics),
     "derivatives": Quantity(TAU, (5, "nv", "nv"), "SI", lambda s: s.derivatives, BY_STATE, is_long=True),
     "inverse_dynamics_derivatives": Quantity(
         QDD, (2, "nv", "nv"), "N m/rad; N m s/rad", lambda s: list(s.torque_rates), BY_STATE[3:], is_long=True
     ),
-    "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy),
-    "energy": Quantity(QD, (), "J", lambda s: s.energy),
+    "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy, has_forms=False),
+    "energy": Quantity(QD, (), "J", lambda s: s.energy, has_forms=False),
     "frame_pose": Quantity(
-        Q, (3, 4), "1; m", lambda s: s.frame.pose, argument="frame",
+        Q, (3, 4), "1; m", lambda s: s.frame.pose, argument="frame", has_forms=False,
         title="Axes of a frame as columns and its origin, m, inertial frame, shape (3, 4).",
     ),
     "frame_jacobian": Quantity(
-        Q, (6, "nv"), "m/rad; 1", lambda s: s.frame.jacobian, argument="frame",
+        Q, (6, "nv"), "m/rad; 1", lambda s: s.frame.jacobian, argument="frame", has_forms=False,
         title="Velocity of a frame's origin, then its angular velocity, for unit speeds, inertial frame, shape (6, nv).",
     ),
     "frame_convective": Quantity(
-        QD, (6,), "m/s2; rad/s2", lambda s: s.frame.convective, argument="frame",
+        QD, (6,), "m/s2; rad/s2", lambda s: s.frame.convective, argument="frame", has_forms=False,
         title="Accelerations of a frame at qdd = 0, of its origin and angular, inertial frame, shape (6,).",
     ),
     "step_derivatives": Quantity(

@@ -85,8 +85,6 @@ def add_parts(
 
 def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
     """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
-    if bare:
-        delete_meshes(spec)
     elements = [*spec.keys, *spec.sensors]
     elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
     for actuator in spec.actuators:

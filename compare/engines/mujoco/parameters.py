@@ -225,16 +225,19 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
 
 
 def of_welded(source: Source) -> list[Finding]:
-    """Which bodies are one with another, of a Source that is joined; links without mass."""
+    """Which bodies are one with another, of a Source that is joined; links without mass, or with negligible mass."""
     model, findings = source.model, []
     names = {body: element_name(model, "body", body) for body in range(model.nbody)}
     if pairs := [f"{names[body]} on {names[base]}" for body, base in source.welded.items() if base]:
         findings.append(Finding("remarks", "welded", {"pairs": pairs}))
-    if fixed := [names[body] for body, base in source.welded.items() if not base]:
-        findings.append(Finding("remarks", "fixed", {"bodies": fixed}))
-    light = [body for body in sorted(set(model.jnt_bodyid.tolist())) if not model.body_mass[body]]
-    if light:
-        findings.append(Finding("remarks", "massless", {"links": [names[body] for body in light]}))
+    still = [body for body, base in source.welded.items() if not base]
+    light = [body for body in sorted({*model.jnt_bodyid.tolist()} - {*still}) if not model.body_mass[body]]
+    is_moving = moving(model)
+    kinds = {"fixed": [body for body in still if not is_moving[body]],
+             "negligible": [body for body in still if is_moving[body]], "massless": light}  # fmt: skip
+    for kind, bodies in kinds.items():
+        if bodies:
+            findings.append(Finding("remarks", kind, {"links": [names[body] for body in bodies]}))
     return findings
 
 

@@ -61,6 +61,7 @@ class Source:
         self.missing: tuple[str, ...] = ()
         self.welded: dict[int, int] = {}
         self._spec: mujoco.MjSpec | None = None
+        self._bare: mujoco.MjSpec | None = None
         if isinstance(origin, mujoco.MjModel):
             self.model = mujoco.MjModel.__copy__(origin)
         elif isinstance(origin, Path | str):
@@ -74,8 +75,10 @@ class Source:
         if not self.text.strip():
             raise ModelError(f"{self} is empty; expected MJCF or URDF")
         lines: list[str] = []
-        before = mujoco.get_mju_user_warning()
+        before, cache = mujoco.get_mju_user_warning(), mujoco.mj_getCache()
         mujoco.set_mju_user_warning(lines.append)
+        capacity = mujoco.mj_getCacheCapacity(cache)
+        mujoco.mj_setCacheCapacity(cache, 0)  # it would hold all meshes, in twice the memory of the model
         try:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
@@ -88,6 +91,7 @@ class Source:
             raise ModelError(self.problem(str(error))) from None
         finally:
             mujoco.set_mju_user_warning(before)
+            mujoco.mj_setCacheCapacity(cache, capacity)
         lines += [str(warning.message) for warning in caught]
         self.warnings = tuple(dict.fromkeys(" ".join(line.split()) for line in lines))
         if self._spec.compiler.fusestatic and is_from_geoms(spec):
@@ -128,7 +132,7 @@ class Source:
         return "the model" if self.origin is None else "the text"
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_spec": None}
+        return self.__dict__ | {"_spec": None, "_bare": None}
 
     @property
     def mesh_geoms(self) -> list[tuple[str, list[bool]]]:
@@ -146,6 +150,16 @@ class Source:
                 leave_out(self._spec, self.missing)
         return self._spec
 
+    @property
+    def bare_spec(self) -> mujoco.MjSpec:
+        """A copy of what is stated, without what is only drawn, and without meshes, if they have no mass."""
+        assert self.spec is not None
+        if self._bare is None:
+            self._bare = without_visuals(self.spec)
+            if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
+                delete_meshes(self._bare)
+        return self._bare.copy()
+
     def joined(self) -> "Source":
         """The same, with the mass of bodies that are welded to a moving one in that one."""
         other = copy(self)
@@ -158,11 +172,7 @@ class Source:
         """The compiled model for what touches nothing: meshes are nearly all of its memory, and every copy copies them."""
         if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
             return self.model
-        if self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
-            return self.model
-        spec = without_visuals(self.spec)
-        delete_meshes(spec)
-        model = compiled(spec)
+        model = compiled(self.bare_spec)
         join(model, self.welded)
         return model
 
@@ -179,7 +189,8 @@ class Source:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-                model = compiled_without(without_visuals(self.spec), positions, bare)
+                spec = self.bare_spec if bare else without_visuals(self.spec)
+                model = compiled_without(spec, positions, bare)
         except ValueError as error:
             raise ModelError(f"MuJoCo cannot compile {self} with locked joints {names}: {error}") from None
         join(model, self.welded)

@@ -4,8 +4,8 @@ A deviation of a state is a movement of the positions (nv,), the speeds (nv,) an
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import lru_cache
 from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
@@ -22,6 +22,8 @@ SLEEP = int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0))
 RELAXING = [name for name in ("implicitfast", "discrete") if name in INTEGRATORS]  # the second bears most
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 Act = Callable[[int], None]  # before a step of a run, by its number
+# of models, which are not changed afterwards, for their steps; as long as they are in use
+copies: WeakKeyDictionary[mujoco.MjModel, mujoco.MjModel] = WeakKeyDictionary()
 
 
 class Step:
@@ -32,24 +34,21 @@ class Step:
     """
 
     def __init__(self, model: mujoco.MjModel, dt: float, integrator: str, exact: bool = True) -> None:
-        self.model, self.dt, self.integrator = shared(model, exact), dt, integrator
+        if model not in copies:
+            copies[model] = mujoco.MjModel.__copy__(model)
+        self.model, self.dt, self.integrator = copies[model], dt, integrator
+        self.options = options_of(model, exact) | {"timestep": dt, "integrator": INTEGRATORS[integrator]}
         self.set_options()
         self.data = mujoco.MjData(self.model)
 
     def set_options(self) -> None:
-        self.model.opt.timestep, self.model.opt.integrator = self.dt, INTEGRATORS[self.integrator]
+        for name, value in self.options.items():
+            setattr(self.model.opt, name, value)
 
     @property
     def size(self) -> int:
         """Of a deviation."""
         return 2 * self.model.nv + self.model.na
-
-    def __getstate__(self) -> dict[str, object]:
-        return {name: value for name, value in self.__dict__.items() if name != "data"}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        self.__dict__.update(state)
-        self.data = mujoco.MjData(self.model)
 
     def state(self) -> np.ndarray:
         """The state that the data have."""
@@ -115,20 +114,14 @@ class Step:
         behind[first:] *= (act - nudge >= low)[:, None]
         return list(zip(ahead, behind))
 
-    def contacts(self) -> int:
-        """The number of contacts of the data."""
-        return int(self.data.ncon)
-
     def touching(self, state: np.ndarray, by: np.ndarray) -> set[str]:
         """The pairs of geoms whose contacts have forces at a state that is moved, and how many contacts each has."""
         self.put(state, by)
         mujoco.mj_forward(self.model, self.data)
         contacts = self.data.contact
         pairs = [tuple(pair) for pair in contacts.geom[contacts.efc_address >= 0].tolist()]
-        names = {
-            pair: " and ".join(element_name(self.model, "geom", geom) for geom in pair) for pair in pairs
-        }
-        return {f"{name} ({pairs.count(pair)})" for pair, name in names.items()}
+        names = [" and ".join(element_name(self.model, "geom", geom) for geom in pair) for pair in pairs]
+        return {f"{name} ({pairs.count(pair)})" for pair, name in zip(pairs, names)}
 
     def lengths(self) -> np.ndarray:
         """Of all outputs of the actuators at the data's state."""
@@ -196,17 +189,17 @@ class Step:
         return state if end is state else self.state()
 
 
-@lru_cache(maxsize=4)
-def shared(model: mujoco.MjModel, exact: bool) -> mujoco.MjModel:
-    """A copy of a model, which is not changed afterwards, for its steps."""
-    copy = mujoco.MjModel.__copy__(model)
-    copy.opt.disableflags |= bit("AUTORESET")
-    copy.opt.enableflags &= ~SLEEP  # a body that sleeps has no derivative
+def options_of(model: mujoco.MjModel, exact: bool) -> dict[str, float]:
+    """The options of the steps of a model beside their length and their integrator."""
+    names = ("solver", "tolerance", "iterations", "ls_iterations")
+    options: dict[str, float] = {name: getattr(model.opt, name) for name in names}
+    no_islands = bit("ISLAND") if exact else 0  # with islands the zones of the rows are not kept
+    options["disableflags"] = model.opt.disableflags | bit("AUTORESET") | no_islands
+    options["enableflags"] = model.opt.enableflags & ~SLEEP  # a body that sleeps has no derivative
     if exact:
-        copy.opt.disableflags |= bit("ISLAND")  # with islands the zones of the rows are not kept
-        copy.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON
-        copy.opt.tolerance, copy.opt.iterations, copy.opt.ls_iterations = TOLERANCE, ITERATIONS, LINE_SEARCH
-    return copy
+        options["solver"] = mujoco.mjtSolver.mjSOL_NEWTON
+        options |= {"tolerance": TOLERANCE, "iterations": ITERATIONS, "ls_iterations": LINE_SEARCH}
+    return options
 
 
 class WholeRun(NamedTuple):
@@ -224,11 +217,8 @@ def whole_run(
     squares = np.full(parts * count, np.nan)
     for k, data in enumerate(step.run(start, parts * count)):
         squares[k] = data.qvel @ data.qvel / model.nv
-    speeds, failed = (
-        np.sqrt(squares.reshape(parts, count).mean(axis=1)),
-        np.flatnonzero(~np.isfinite(squares)),
-    )
-    return WholeRun(speeds, float(failed[0] + 1) * dt if len(failed) else None)
+    speeds, failed = squares.reshape(parts, count).mean(axis=1), np.flatnonzero(~np.isfinite(squares))
+    return WholeRun(np.sqrt(speeds), float(failed[0] + 1) * dt if len(failed) else None)
 
 
 def start_of(

@@ -120,10 +120,8 @@ def servo_bias(kp: float, kv: float | None, target: float) -> tuple[float, float
 
 def set_law(model: mujoco.MjModel, i: int, gain: tuple[float, ...], bias: tuple[float, ...]) -> None:
     """Give an actuator of a compiled model a law of constant gain, of three numbers each."""
-    model.actuator_gaintype[i], model.actuator_biastype[i] = (
-        mujoco.mjtGain.mjGAIN_FIXED,
-        mujoco.mjtBias.mjBIAS_AFFINE,
-    )
+    model.actuator_gaintype[i] = mujoco.mjtGain.mjGAIN_FIXED
+    model.actuator_biastype[i] = mujoco.mjtBias.mjBIAS_AFFINE
     model.actuator_gainprm[i, :3], model.actuator_biasprm[i, :3] = gain, bias
 
 

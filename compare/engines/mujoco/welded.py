@@ -10,6 +10,7 @@ from .names import element_name, tensor
 
 # kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other
 LEAST = 1e-14
+LIGHT = 1e-6  # share of a mass, and of M at the position zero, that stands for none
 NO_MASS = "mass and inertia of moving bodies"  # in MuJoCo's message
 
 
@@ -35,10 +36,27 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def welded_bodies(model: mujoco.MjModel) -> dict[int, int]:
-    """The bodies with mass that have no joint, and the body with one to which they are fixed, 0: the world, by number."""
+    """The bodies with mass that have no joint, and the body with one to which they are fixed, 0: the world, by number.
+
+    Those of negligible mass are among them, fixed to the world.
+    """
     massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
     bodies = np.flatnonzero(massive & (model.body_weldid != np.arange(model.nbody)))
-    return {int(body): int(model.body_weldid[body]) for body in bodies}
+    welded = {int(body): int(model.body_weldid[body]) for body in bodies}
+    return welded | dict.fromkeys(negligible(model, np.flatnonzero(massive)), 0)
+
+
+def negligible(model: mujoco.MjModel, bodies: np.ndarray) -> list[int]:
+    """Those of some bodies that move with others, and whose mass and inertia stand for none."""
+    most = LIGHT * model.body_subtreemass[model.body_weldid[bodies]]
+    found = []
+    for body in bodies[(model.body_mass[bodies] <= most) & (model.body_weldid[bodies] > 0)]:
+        without = mujoco.MjModel.__copy__(model)
+        without.body_mass[body] = without.body_inertia[body] = 0.0
+        mujoco.mj_setConst(without, mujoco.MjData(without))
+        if np.allclose(without.dof_M0, model.dof_M0, rtol=LIGHT, atol=0.0):
+            found.append(int(body))
+    return found
 
 
 def join(model: mujoco.MjModel, welded: Mapping[int, int]) -> None:

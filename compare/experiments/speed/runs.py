@@ -106,11 +106,8 @@ def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRun
 
 def runs_of(scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool) -> list[Run]:
     """The runs by methods whose loop is compiled, or by the others."""
-    some = [
-        method
-        for method in methods(engines, size, scene.case)
-        if (method.engine in IN_QUICK_RUNS) == compiled
-    ]
+    every = methods(engines, size, scene.case)
+    some = [method for method in every if (method.engine in IN_QUICK_RUNS) == compiled]
     return [run for method in some for run in series(scene, engines[method.engine], method, size)]
 
 

@@ -95,6 +95,7 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
         result.rows += part.rows
         result.checks += part.checks
         result.runs += part.runs
+    errors.find_energy(result, setup.engines["mujoco"])
     errors.find_departures(result, robot)
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])

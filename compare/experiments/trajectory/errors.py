@@ -89,7 +89,7 @@ def find_departures(result: TrajectoryResult, robot: Robot) -> None:
 
 @dataclass
 class EnergyRow(Row):
-    """The drift of the energy in a free run of a second."""
+    """The drift of the energy in a free run."""
 
     scene: str
     integrator: str
@@ -119,12 +119,34 @@ def measure_energy(robot: Robot, engines: Mapping[str, Engine], steps: Mapping[i
     return result
 
 
+def find_energy(result: TrajectoryResult, mujoco: Engine) -> None:
+    """The drift of MuJoCo's energy in the free, undamped scenes of a file or a user, with the coarsest step."""
+    for case in {run.case.name: run.case for run in result.runs}.values():
+        if not case.is_free or "own" not in case.scene.tags or any(case.tree.damping):
+            continue
+        runs = [run for run in result.runs if run.case.name == case.name]
+        dt = max(run.dt for run in runs)
+        by_scheme = {run.scheme: run.paths["mujoco"] for run in runs if run.dt == dt}
+        rows = []
+        for method in [method for method in mujoco.methods.values() if method.scheme in by_scheme]:
+            path = by_scheme[method.scheme]
+            drift = drift_of(path.q, path.v, case) if path.ended is None else None
+            rows.append(EnergyRow(case.name, method.name, dt, "mujoco", drift))
+        result.tables["energy"] += rows
+        result.top.append(result.finding("energy", rows=rows, duration=case.duration))
+
+
 def largest_drift(case: Case, dynamics: Dynamics, method: str, count: int) -> float:
     """The largest change of the energy in a second, J; NaN if the run has diverged."""
     motion = dynamics.run(*case.start, case.tau, DURATION / count, count, method)
     if not np.isfinite(motion.states).all():
         return np.nan
-    energy = literal.energy(motion.q, motion.v, case.tree)
+    return drift_of(motion.q, motion.v, case)
+
+
+def drift_of(q: np.ndarray, v: np.ndarray, case: Case) -> float:
+    """The largest change of the energy along a run, J."""
+    energy = literal.energy(q, v, case.tree)
     return float(np.abs(energy - energy[0]).max())
 
 

@@ -191,9 +191,8 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     of_positions = width[:, : case.coordinates.nv].max(axis=1)
     run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
     tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
-    return Twin(
-        run, width, rules.widest_judged(case, path.q, path.v), times[single], states, stepped, tolerance
-    )
+    widest = rules.widest_judged(case, path.q, path.v)
+    return Twin(run, width, widest, times[single], states, stepped, tolerance)
 
 
 def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:

@@ -41,8 +41,7 @@ def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     assert row.record().items() >= stated.items()
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
     assert list(map(say, result.notes)) == [check.note]
-    ((*_, caption),) = [draw() for draw in diagnosis.figures(result, None)]
-    assert caption.values["names"][0] == "mass of forearm"
+    assert not list(diagnosis.figures(result, None))  # the cause says it
 
 
 def test_damping_is_seen_in_accelerations_alone():

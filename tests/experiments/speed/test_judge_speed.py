@@ -43,9 +43,8 @@ def judged(check, found, floor) -> dict[str, bool]:
 
 
 def advised(found) -> list[Row]:
-    return conclusions.advice(
-        SpeedResult("speed", rows=[run.row for run in found], floors={"bent, free": 1e-16})
-    )
+    rows = [run.row for run in found]
+    return conclusions.advice(SpeedResult("speed", rows=rows, floors={"bent, free": 1e-16}))
 
 
 @pytest.mark.parametrize("ours, theirs, verdict", [
@@ -56,6 +55,12 @@ def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
     found = [run_of("tmt", "rk4", ours), run_of("mujoco", "RK4", theirs), run_of("tmt", "rk4", 1.0, 128)]
     expected = {} if verdict is None else {"the same error as tmt's rk4": verdict}
     assert judged(conclusions.check_same_schemes, found, 1e-10) == expected
+
+
+@pytest.mark.parametrize("difference, passes", [(127e-10, True), (129e-10, False)])
+def test_each_of_many_steps_may_round_by_half_an_eps(difference, passes):
+    found = [run_of("tmt", "rk4", 1e-3, 256), run_of("mujoco", "RK4", 1e-3 + difference, 256)]
+    assert [*judged(conclusions.check_same_schemes, found, 1e-10).values()] == [passes]
 
 
 @pytest.mark.parametrize("theirs, ours, left, found", [

@@ -50,9 +50,8 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
 def test_methods_are_those_of_the_engines_that_are_there(engines):
     full, quick, small = (settings.methods(engines, size, BENT) for size in ("full", "quick", "small"))
     there = [engine for engine in engines.values() if engine.unavailable() is None]
-    there = [
-        engine for engine in there if not RECORDS[engine.name].reads_file
-    ]  # see the experiment `engines`
+    # of those that read the file: the experiment `engines`
+    there = [engine for engine in there if not RECORDS[engine.name].reads_file]
     assert full == small == [method for engine in there for method in engine.methods.values()]
     assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
 
@@ -135,9 +134,8 @@ def test_a_small_run_takes_every_path(engines, small):
     methods = {(method.engine, method.name) for method in settings.methods(engines, "full", BENT)}
     assert {(row.engine, row.method) for row in ran} == methods
     assert {row.quantity for row in costs} == {"forward_dynamics"}
-    assert {(row.error, row.worst_error, row.energy_error) for row in ran if row.diverged} == {
-        (None, None, None)
-    }
+    lost = [row for row in ran if row.diverged]
+    assert {(row.error, row.worst_error, row.energy_error) for row in lost} == {(None, None, None)}
     coarse = [row for row in ran if row.steps == 64 and row.method in ("rk4", "RK4")]
     for scene, error in {"zero, free": 1.6, "bent, free": 0.27}.items():
         errors = [row.worst_error for row in coarse if row.scene == scene]

@@ -1,21 +1,9 @@
-"""The edits, by what they break; a row of a module has the fields of an Edit in their order."""
+"""The edits, by what they break, in the files of this folder; a row has the fields of an Edit in their order."""
+
+from importlib import import_module
+from pathlib import Path
 
 from ..edit import Edit
-from . import (
-    checks,
-    engines,
-    fleet,
-    motion,
-    own,
-    parameters,
-    report,
-    rules,
-    servos,
-    speed,
-    stability,
-    steps,
-    tmt,
-)
 
-MODULES = rules, checks, parameters, motion, own, speed, stability, steps, servos, report, tmt, fleet, engines
-EDITS = tuple(Edit(*row) for module in MODULES for row in module.EDITS)
+FILES = sorted(Path(__file__).parent.glob("[a-z]*.py"))
+EDITS = tuple(Edit(*row) for file in FILES for row in import_module(f".{file.stem}", __package__).EDITS)

@@ -9,6 +9,8 @@ EDITS = (
     ("engines.readings", "add_differing", "cause_of(_1)", "None", "no cause is named"),
     ("engines.answer", "as_set", "all(_1)", "True", "other equations are said to be the same"),
     ("engines.answer", "cheapest_of", "row.worst_error <= target", "True", "a method that is not exact enough is the cheapest"),
+    ("engines.answer", "cheapest_engine", "min(reached, *_1)", "max(reached, *_1)", "the dearest engine is the cheapest"),
+    ("engines.integrators", "step_of", "np.floor(_1)", "np.ceil(_1)", "a single step is longer than the file's"),
     ("engines.outside", "OutsideDynamics.acting", "self.is_set", "True", "damping is that of the file, whatever was read"),
     ("engines.outside.model", "movement", "moved.origin - turn @ link.origin", "moved.origin", "an anchor is a point of a body"),
     ("timing", "is_timed", "scatter(taken) <= STEADY", "True", "one disturbed call is a time"),

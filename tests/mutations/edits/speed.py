@@ -22,7 +22,7 @@ EDITS = (
     ("conclusions", "order_in", "clear < run.early < REGULAR", "True", "the order is measured among errors of rounding"),
     ("judge.order", "LEAST_ORDER", "7.0", "1.0", "order 8 need only be 1"),
     ("truth.reference", "coarsest_steps", "RECORDS if case.controller else _1", "_1", "steps of a step response begin fine"),
-    ("conclusions", "check_same_schemes", "FACTOR * scene.floor", "1e6 * scene.floor", "the same scheme: 64 -> 1e6"),
+    ("conclusions", "check_same_schemes", "max(FACTOR, _1)", "1e6", "the same scheme: 64 -> 1e6"),
     ("conclusions", "check_smallest_errors", "FACTOR * scene.floor", "100 * FACTOR * scene.floor", "tolerance x 100"),
     ("conclusions", "check_smallest_errors", "_1.any()", "_1.all()", "a MuJoCo that alone diverges is left out"),
     ("speed.runs", "SpeedRow.largest_error", "math.inf", "0.0", "a run that diverged has no error"),

@@ -1,7 +1,7 @@
 """Edits of the step of a file at rest: its derivative, closed form, limits, runs, programs, motions, cures."""
 
 EDITS = (
-    ("mujoco.step", "shared", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
+    ("mujoco.step", "options_of", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
     ("mujoco.step", "Step.run_program", "(step - delay) // period", "step // period", "a delay delays nothing"),
     ("mujoco.step", "Step.relaxed", "1.0 - rate * self.dt", "1.0", "a relaxed run is not damped"),
     ("mujoco.forces", "rows", "m.opt.cone == _1 and size > 1", "False", "pyramids have as many rows as ellipses"),
@@ -39,7 +39,7 @@ EDITS = (
     ("naming", "limiting", "taken > most", "taken < most", "the contact that takes least limits"),
     ("stability.answer", "StepLimitRow.longest", "self.decided_by_runs", "False", "the file's own run says nothing"),
     ("stability.answer", "add_smooth_limit", "limit(place.frictionless, *_1)", "limit(place.model, *_1)", "dry friction stays"),
-    ("stability.answer", "answer", "standing if contacts else _1", "standing", "in the air it stands"),
+    ("stability.answer", "answer", "place and not contacts", "False", "in the air it stands"),
     ("stability.place", "placed", "np.array(posture.q) if _1 else None", "None", "a posture in numbers is qpos0"),
     ("stability.place", "placed", "thrown or touches(*_1)", "thrown", "what bounces on its floor is in the air"),
     ("stability.place", "placed", "restless_objects(*_1) if contacts else _2", "_2", "what moves on beside it hides a robot"),
