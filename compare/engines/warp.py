@@ -145,6 +145,7 @@ class Model(OfCompiled):
         for _ in course.times[1:]:
             for _ in range(course.every):
                 advance()
-            states.append((data.qpos.numpy()[0].copy(), data.qvel.numpy()[0].copy()))  # on a CPU they are views
+            # on a CPU the arrays are views
+            states.append((data.qpos.numpy()[0].copy(), data.qvel.numpy()[0].copy()))
         qpos, qvel = map(np.array, zip(*states))
         return qpos, qvel

@@ -15,13 +15,12 @@ from . import runs
 from .closed_form import radius_apart
 from .cures import Cure, cures
 from .growth import Growth
-from .limits import LONGEST, Limit, limit, tried
+from .limits import LONGEST, Curve, Limit, limit, tried
 from .place import MOVING, Place, Posture, in_the_air_at, standing_at
 from .rest import SETTLED, Rest
 
 UNHELD = 0.99  # of a limit: lower ones without dry friction
 SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
-CURVE_RUNS = 0.8, 1.05, 1.15, 1.4, 2.0  # of a limit: steps of runs beside its curve
 
 
 def step_column(digits: int = 4, **more: Any) -> Any:
@@ -115,15 +114,8 @@ def integrators_at_rest() -> list[str]:
     return [name for name in INTEGRATORS if name != "implicit"]
 
 
-class Curve(NamedTuple):
-    """The factor by which deviations grow in a step, over the step, s, of an integrator at a place; and that seen in runs."""
-
-    predicted: list[tuple[float, float]]
-    observed: list[tuple[float, float]]
-
-
 class PlaceAnswer(NamedTuple):
-    """What is known of a place: a row of each integrator, the curves, what makes the file's step stable."""
+    """What is known of a place: a row of each integrator, curves of growth, what makes the file's step stable."""
 
     rows: list[StepLimitRow]
     curves: dict[str, Curve]
@@ -152,25 +144,10 @@ def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> 
         row, found = limit_row(place, integrator, asked)
         rows.append(row)
         if asked.drawn and row.is_known:
-            curves[integrator] = curve(place, row, found)
+            curves[integrator] = found.curve
         if contacts and integrator == asked.integrator and row.stable_at_file_dt is False:
             changes = cures(runs_of(place, found, integrator, asked.dt), asked.dt)
     return PlaceAnswer(rows, curves, changes)
-
-
-def curve(place: Place, row: StepLimitRow, found: Limit) -> Curve:
-    """The growth over the step: at the steps of the search, and about the limit, where runs stand beside it."""
-    tries, seen, state = list(found.tries), [], found.rest.state
-    for share in CURVE_RUNS if row.predicted_dt else ():
-        at = tried(place.model, state, share * (row.predicted_dt or 0.0), row.integrator)
-        if not at.rest.is_found:
-            break
-        tries.append(at)
-        state = at.rest.state
-        if (factor := runs.growth_in_run(at.rest)) is not None:
-            seen.append((at.dt, factor))
-    predicted = [(at.dt, at.growth.factor) for at in tries if at.rest.is_found]
-    return Curve(sorted(predicted), seen)
 
 
 def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow, Limit]:

@@ -82,12 +82,12 @@ def speeds_of(run: Iterable[mujoco.MjData]) -> np.ndarray:
     return np.array([data.qvel.copy() for data in run])
 
 
-def apart(run: Iterable[mujoco.MjData], plain: np.ndarray, most: float = GROWN * SMALL_PUSH) -> np.ndarray:
-    """The largest difference of a speed after each step from that of the run without a push, until it exceeds `most`."""
+def apart(run: Iterable[mujoco.MjData], plain: np.ndarray) -> np.ndarray:
+    """The largest difference of a speed after each step from that of the run without a push, until that is large."""
     sizes = []
     for data, speeds in zip(run, plain):
         sizes.append(np.abs(data.qvel - speeds).max())
-        if not sizes[-1] <= most:
+        if not sizes[-1] <= GROWN * SMALL_PUSH:
             break
     return np.array(sizes)
 

@@ -18,6 +18,7 @@ BY_ITSELF = 0.7, 1.4  # of its rate at a coarser step: a slow growth whose rate 
 SADDLE = 0.1  # 1/s: what grows by itself and slower is a drift
 GIVES_WAY = 0.3  # rad or m: a rest so far from where the search began is another one
 BESIDE_DRIFT = 2.0  # fold: what grows faster than a drift
+Curve = list[tuple[float, float]]  # steps, s, and the factors by which deviations grow in them
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,11 @@ class Limit:
     @property
     def first(self) -> Tried:
         return self.tries[0]
+
+    @property
+    def curve(self) -> Curve:
+        """The growth at the steps of the search."""
+        return sorted((at.dt, at.growth.factor) for at in self.tries if at.rest.is_found)
 
 
 def tried(model: mujoco.MjModel, state: np.ndarray, dt: float, integrator: str, drift: float = 0.0) -> Tried:

@@ -8,13 +8,12 @@ import mujoco
 import numpy as np
 
 from ..engines.mujoco.step import Step, distance
-from .growth import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, push_of, pushed, speeds_of
+from .growth import LASTS, MOST_STEPS, push_of
 from .limits import COARSER, LONGEST, SHORTEST, bisected
-from .rest import WILD, Rest
+from .rest import WILD
 
 BELOW, ABOVE = 0.97, 1.03  # of a limit: the steps at which runs are to differ
 WITHIN = 1.065  # fold: how near they are where they differ elsewhere
-CURVE_STEPS, LEAST_SIZES = 400, 16  # of a run that shows how fast a push grows, and while it is small
 LIMIT_PUSHES = 1e-3, 1e-6  # rad/s or m/s: at the start of runs that show a limit
 WAYS = range(4)  # the signs of such a push, which decide where dry friction holds
 PUSHES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6)  # rad/s or m/s, of all speeds
@@ -24,16 +23,6 @@ FAR = 0.5  # rad or m: from a rest to what is another one
 AS_FAST = 4.0  # fold: of the creep, and of a run of fine steps
 THROWN = 10.0  # fold, of the push: a speed at the end that no push leaves
 FINER, FINEST = 8, 2e-4  # fold, and s: of the steps that show what the robot does by itself
-
-
-def growth_in_run(rest: Rest) -> float | None:
-    """The factor by which a small push grows in a step of a run, after its first quarter; None: it is small too shortly."""
-    plain = speeds_of(rest.step.run(rest.state, CURVE_STEPS))
-    sizes = apart(rest.step.run(pushed(rest, SMALL_PUSH), len(plain)), plain, GROWN**2 * SMALL_PUSH)
-    if len(sizes) < LEAST_SIZES or not sizes.min() > 0.0:
-        return None
-    first = len(sizes) // 4
-    return float(np.exp(np.polyfit(np.arange(first, len(sizes)), np.log(sizes[first:]), 1)[0]))
 
 
 def lasting(dt: float) -> float:

@@ -21,7 +21,7 @@ from compare.stability.control import controlled
 from compare.stability.growth import growth, has_grown, push_of
 from compare.stability.limits import Tried, tried
 from compare.stability.motion import motion
-from compare.stability.runs import PUSHES, USUAL_PUSH, WAYS, Runs, growth_in_run, upwards
+from compare.stability.runs import PUSHES, USUAL_PUSH, WAYS, Runs, upwards
 
 WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
@@ -61,15 +61,6 @@ def test_a_step_is_stable_at_a_rest_nearby_where_nothing_grows_faster_than_what_
     usual = {"rest": SimpleNamespace(is_found=True), "growth": SimpleNamespace(rate=0.09)}
     usual |= {"dt": 0.1, "drift": 0.0, "moved": 0.29}
     assert Tried(**usual | more).is_stable is stable
-
-
-def test_growth_in_a_run_is_that_of_the_step():
-    place = place_of(hinge(20.0, 5.0))
-    for dt in (0.021, 0.03):
-        at = tried(place.model, place.rest, dt, "Euler")
-        assert at.growth.factor > 1.05
-        assert growth_in_run(at.rest) == pytest.approx(at.growth.factor, rel=1e-3)
-    assert growth_in_run(tried(place.model, place.rest, 0.001, "Euler").rest) < 1.0
 
 
 @pytest.mark.parametrize(

@@ -99,16 +99,16 @@ def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
     assert StepLimitRow(**ROW | {"smooth_dt": smooth}).is_held_by_friction is held
 
 
-def test_curves_have_the_growth_of_steps_and_of_runs():
+def test_a_curve_has_the_growth_of_the_step_of_one_hinge():
     reading = read(hinge(20.0, 5.0))
     asked = Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)
     found = answer(postures_of(reading)[0], True, reading, asked)
     curve, limit = found.curves["Euler"], found.rows[0].predicted_dt
-    assert all((factor > 1.0) == (dt > limit) for dt, factor in curve.predicted)
-    assert curve.predicted[-1][1] > 1.5
-    seen = dict(curve.predicted)
-    grown = [(dt, factor) for dt, factor in curve.observed if factor > 1.0]
-    assert len(grown) > 2 and all(factor == pytest.approx(seen[dt], rel=1e-3) for dt, factor in grown)
+    assert all((factor > 1.0) == (dt > limit) for dt, factor in curve)
+    dt, factor = curve[-1]
+    speeds = np.array([[1.0, 0.0], [-20.0 * dt / INERTIA, 1.0 - 5.0 * dt / INERTIA]])
+    exact = np.abs(np.linalg.eigvals(np.array([[1.0, dt], [0.0, 1.0]]) @ speeds)).max()
+    assert factor == pytest.approx(exact, rel=1e-6) and exact > 1.05
     assert found.cures == []
     unstable = answer(postures_of(reading)[0], True, reading, Asked(0.03, "Euler", ["Euler"], in_runs=False))
     assert {cure.change for cure in unstable.cures} >= {"less_kv", "more_armature"}

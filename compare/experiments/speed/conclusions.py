@@ -64,7 +64,7 @@ def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
             difference = abs(mujoco.largest_error - twin.largest_error)
             where = f"{scene.case.name}, {mujoco.method}, dt = {run.dt:.3g} s"
             quantity = f"the same error as tmt's {twin.method}"
-            tolerance = max(FACTOR, mujoco.steps / 2.0) * scene.floor
+            tolerance = max(FACTOR, (mujoco.steps or 0) / 2.0) * scene.floor
             result.check(where, quantity, difference, tolerance, result.unit, rounding=True)
 
 

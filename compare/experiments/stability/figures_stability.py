@@ -38,7 +38,7 @@ GROWTH_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn o
     "RK4": (PINK, (0, (5, 1)), "^", 1.3),
 }
 TITLES = {"contact": "in contact", "free": "touching nothing", "air": "in the air"}
-MOST_GROWTH = 3.0  # of a step: the upper end of the axis
+MOST_GROWTH = 1.5  # of a step: the upper end of the axis
 MARKS, MUJOCO_MARKS = "ov^DsP", "x+1"
 
 
@@ -129,7 +129,7 @@ def draw_limits(
 
 
 def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
-    """Growth over step: a line for each integrator, marks of runs, the file's own step; a panel for each surroundings."""
+    """Growth over step: a line for each integrator, marks of limits, the file's own step; a panel for each surroundings."""
     rows = result.tables["step_limits"]
     dt, integrator, posture = rows[0].file_dt, rows[0].file_integrator, rows[0].posture
     fig = Figure(figsize=(WIDTH, 3.8), layout="constrained")
@@ -137,16 +137,16 @@ def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
     for ax, (surroundings, curves) in zip(panels, result.growth.items()):
         for name, curve in curves.items():
             colour, dash, marker, width = GROWTH_LOOKS[name]
-            steps, factors = zip(*curve.predicted) if curve.predicted else ((), ())
-            ax.plot(steps, factors, color=colour, linestyle=dash, linewidth=width, label=name)
-            if curve.observed:
-                looks: dict[str, Any] = {"color": colour, "markersize": 6, "markeredgecolor": "black"}
-                ax.plot(*zip(*curve.observed), marker, zorder=4, **looks)
+            ax.plot(*zip(*curve), color=colour, linestyle=dash, linewidth=width, label=name)
+            limits = [
+                row.longest for row in rows if (row.surroundings, row.integrator) == (surroundings, name)
+            ]
+            ax.plot(limits[0], 1.0, marker, color=colour, markersize=6, markeredgecolor="black", zorder=4)
         ax.axhline(1.0, color="black", linewidth=0.6)
         ax.axvline(dt, color="black", linewidth=0.8, linestyle=":")
         ax.set(xscale="log", xlabel="dt, s", ylim=(0.9, MOST_GROWTH), title=TITLES[surroundings])
     panels[0].set_ylabel("growth of a deviation in a step")
-    panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="in runs")
+    panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="limit")
     fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
     values = {"posture": posture, "dt": dt, "integrator": integrator}
     return "stability_growth", fig, result.finding("figure_growth", OF, **values)

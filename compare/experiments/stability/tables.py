@@ -6,7 +6,8 @@ from functools import partial
 from ...core.check import Result
 from ...core.rows import Column, Row, column
 from ...engines import LABELS
-from ...stability.answer import Curve, step_column
+from ...stability.answer import step_column
+from ...stability.limits import Curve
 
 time_step = partial(step_column, digits=5)
 
