@@ -145,6 +145,6 @@ class Model(OfCompiled):
         for _ in course.times[1:]:
             for _ in range(course.every):
                 advance()
-            states.append((data.qpos.numpy()[0], data.qvel.numpy()[0]))
+            states.append((data.qpos.numpy()[0].copy(), data.qvel.numpy()[0].copy()))  # on a CPU they are views
         qpos, qvel = map(np.array, zip(*states))
         return qpos, qvel

@@ -125,8 +125,9 @@ class Place:
 
     @property
     def has_fallen(self) -> bool:
-        """Whether a free body is far from where it was: a walker that lies."""
-        return bool(((np.abs(self.moved) > FALLEN) & of_base(self.model)).any())
+        """Whether a free body is far from where it was, and lies there or falls on; not one that floats."""
+        is_far = bool(((np.abs(self.moved) > FALLEN) & of_base(self.model)).any())
+        return is_far and (self.is_touching or self.falls)
 
     @property
     def moved(self) -> np.ndarray:

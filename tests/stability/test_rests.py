@@ -67,6 +67,14 @@ def test_what_falls_has_no_rest_and_one_in_the_air_has():
     assert in_the_air_at(place_of(hinge())) is None  # nothing touches it, and it rests
 
 
+def test_what_floats_without_gravity_turns_and_does_not_fall():
+    key = '</worldbody><keyframe><key qvel="0 0 0 0 0 90"/></keyframe>'
+    floating = place_of(
+        STONE.replace("timestep", 'gravity="0 0 0" timestep').format("").replace("</worldbody>", key)
+    )
+    assert np.abs(floating.moved).max() > 0.5 and not floating.has_fallen
+
+
 def test_in_the_air_a_base_that_would_fall_has_no_weight_and_a_fixed_one_has():
     """A base falls that has a free joint, or slides downwards with nothing on its joint."""
     hanging = LEG.replace('name="lift"', 'name="lift" stiffness="900"')

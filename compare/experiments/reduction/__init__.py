@@ -53,10 +53,17 @@ def rows(setup: Setup) -> ReductionResult:
             result.check(
                 "every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM
             )
-    if setup.alone and setup.reading and not robot.is_stated:
+    if setup.reading and not robot.is_stated and is_asked(setup):
         of_file.add(result, setup, setup.reading)
     result.top += answers(result, robot)
     return result
+
+
+def is_asked(setup: Setup) -> bool:
+    """Whether a run answers what a motion of the file needs: by itself, in a full run, or with an option of it."""
+    request = setup.request
+    given = request.error, request.points, request.controls, request.write
+    return setup.alone or setup.size == "full" or any(option is not None for option in given)
 
 
 def answers(result: ReductionResult, robot: Robot) -> list[Finding]:

@@ -161,11 +161,8 @@ def test_the_drift_of_the_energy_is_told_of_the_coarsest_step_where_a_file_is_fr
 ):
     free, damped = (replace(case, scene=replace(case.scene, tags=("own",))) for case in (FREE, DAMPED))
     run = run_of(free, theirs=0.1, ended=(None, ended))
-    others = (
-        run_of(free, steps=128),
-        run_of(damped),
-        run_of(CASES["zero, free"]),
-    )  # of which the last is the arm's
+    # the last is the arm's
+    others = run_of(free, steps=128), run_of(damped), run_of(CASES["zero, free"])
     result = TrajectoryResult("trajectory", runs=[run, *others])
     result.tables["energy"] = []
     errors.find_energy(result, engines["mujoco"])
