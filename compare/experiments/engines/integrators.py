@@ -11,7 +11,7 @@ from ...core.check import About, Result
 from ...engines import GRID, LABELS, RECORDS, Engine, Method, Setting
 from ...engines.outside.file import EngineError, TooLong
 from ...judge.agree import closest
-from ...judge.order import MeasuredOrder, check_order, measured_order
+from ...judge.order import MeasuredOrder, check_order, is_higher, measured_order
 from ...judge.rounding import step_rounding
 from ...judge.scale import EPS
 from ...robots.case import Case
@@ -48,7 +48,10 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
             continue
         if case and measured and method.order:
             where, note = f"{case.name}, {method.label}", f"{measured.order:.2f}"
-            check_order(result, where, method.order, measured.order, note=note)
+            twin = None
+            if is_higher(measured.order, method.order):
+                twin = order_of_twin(setup, case, method)
+            check_order(result, where, method.order, measured.order, note=note, twin=twin)
 
 
 def follow_known(result: Result, setup: Setup) -> None:
@@ -117,6 +120,17 @@ def add_runs(
         row.measured_order = measured and measured.order
     result.tables["engines_methods"] += rows
     return measured
+
+
+def order_of_twin(setup: Setup, case: Case, method: Method) -> float | None:
+    """The order of tmt's same scheme in the runs by which that of an engine is measured; None: it has none."""
+    if method.scheme not in METHODS:
+        return None
+    tmt = setup.engines["tmt"]
+    twin = next(one for one in tmt.methods.values() if one.scheme == method.scheme)
+    unlisted = Result("engines", tables={"engines_methods": []})
+    measured = add_runs(unlisted, setup, case, tmt, twin)
+    return measured and measured.order
 
 
 def order_of(steps: Sequence[float], errors: Sequence[float], eps: float) -> MeasuredOrder | None:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...core.rows import MOVEMENT, MovementRow, Row, column
-from ...judge.order import LEAST_ORDER, MeasuredOrder, check_order, measured_order
+from ...engines import Method
+from ...judge.order import LEAST_ORDER, MeasuredOrder, check_order, is_higher, measured_order
 from ...judge.scale import FACTOR
 from ..followed import REGULAR
 from .runs import NEAR_ROUNDING, Run, SceneRuns, SpeedResult, SpeedRow
@@ -36,12 +37,22 @@ def check_orders(result: SpeedResult, scenes: Sequence[SceneRuns], engines: Sequ
     """Rows and checks: the stated and the measured order of each method of fixed step of these engines."""
     rows = []
     for scene in scenes:
+        orders: list[tuple[Method, int, MeasuredOrder]] = []
+        higher: list[OrderRow] = []  # with the same order as tmt's
         for method, runs in groupby(scene.runs, key=lambda run: run.method):
             measured = order_in(scene, list(runs)) if method.order and method.engine in engines else None
-            if measured:
-                where, note = f"{scene.case.name}, {method.engine} {method.name}", f"{measured.order:.2f}"
-                check_order(result, where, method.order, measured.order, note=note)
-                rows.append(OrderRow(scene.case.name, method.engine, method.name, method.order, *measured))
+            if method.order and measured:
+                orders.append((method, method.order, measured))
+        by_tmt = {method.scheme: measured.order for method, _, measured in orders if method.engine == "tmt"}
+        for method, order, measured in orders:
+            where, note = f"{scene.case.name}, {method.engine} {method.name}", f"{measured.order:.2f}"
+            twin = by_tmt.get(method.scheme) if method.engine != "tmt" else None
+            check = check_order(result, where, order, measured.order, note=note, twin=twin)
+            rows.append(OrderRow(scene.case.name, method.engine, method.name, order, *measured))
+            if check.passed and order not in LEAST_ORDER and is_higher(measured.order, order):
+                higher.append(rows[-1])
+        if higher:
+            result.find("higher", scene=scene.case.name, rows=higher)
     return rows
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from compare.core.rows import Row
+from compare.core.text import say
 from compare.engines import Method, Setting
 from compare.experiments import speed
 from compare.experiments.speed import conclusions, evaluations, runs
@@ -111,6 +112,24 @@ def test_an_order_is_measured_where_errors_fall_regularly(errors, measured, floo
     table = conclusions.check_orders(result, [scene], ["tmt"])
     assert [row.measured_order for row in table] == pytest.approx(measured)
     assert [check.passed for check in result.checks] == [True] * len(measured)
+
+
+@pytest.mark.parametrize("of_mujoco, of_tmt, failed, higher", [
+    (5.0, 5.0, [], ["RK4", "rk4"]), (4.0, 4.0, [], []),
+    (5.0, 4.0, ["bent, free, mujoco RK4"], []), (4.0, 5.0, ["bent, free, mujoco RK4"], ["rk4"]),
+    (3.0, 3.0, ["bent, free, mujoco RK4", "bent, free, tmt rk4"], []),
+])  # fmt: skip
+def test_a_higher_order_is_said_and_fails_only_where_tmts_same_scheme_has_another(
+    of_mujoco, of_tmt, failed, higher
+):
+    """As semi-implicit Euler from a state without forces."""
+    found = series("mujoco", "RK4", falling(of_mujoco)) + series("tmt", "rk4", falling(of_tmt))
+    result = SpeedResult("speed")
+    conclusions.check_orders(result, [scene_of(found, 1e-16)], ["mujoco", "tmt"])
+    assert [check.scene for check in result.checks if not check.passed] == failed
+    said = " ".join(say(note) for note in result.notes)
+    assert [row.method for note in result.notes for row in note.values["rows"]] == higher
+    assert ("with order 5.00 (stated: 4)" in said) == bool(higher)
 
 
 def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
