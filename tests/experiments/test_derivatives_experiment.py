@@ -11,7 +11,8 @@ from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
 from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
-from compare.experiments.derivatives import contact_rows, of_mujoco, subjects, ways
+from compare.experiments.derivatives import add_advice, begin, contact_rows, of_mujoco, subjects, ways
+from compare.experiments.derivatives.figures_derivatives import draw_errors
 from compare.experiments.derivatives.ways import CostRow, DerivativeRow, best_of, worst_of_each_eps
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
@@ -41,8 +42,57 @@ def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_deriva
     assert 1e-10 < values["inverse"].error < 1e-5 and values["exact"].error < 1e-12
     values = {**values, "centred": dataclasses.replace(centred, eps=1e-5, unit="m per N", largest=3.0)}
     said = say(Finding("derivatives", "advice", values))
-    assert "differences: use eps 1e-05, centred" in said and "m per N, of 3)" in said
+    assert (
+        "(A and B; mjd_transitionFD does not take it): use eps 1e-05, centred" in said
+        and "m per N, of 3)" in said
+    )
     assert "contacts left out: use" in say(Finding("derivatives", "advice", values | {"in_air": True}))
+
+
+def row(quantity="A and B, Euler", **values) -> DerivativeRow:
+    about = {"subject": "swing", "states": 1, "unit": "rad per rad", "largest": 1.0}
+    return DerivativeRow(quantity=quantity, **(about | values))
+
+
+@pytest.mark.parametrize("integrator, eps, way, steps", [
+    ("Euler", 1e-4, "mjd_transitionFD", 1e-3), ("implicit", 1e-6, "mjd_transitionFD", 1e-5),
+    ("RK4", 1e-3, "differences of mj_step", None),
+])  # fmt: skip
+def test_the_eps_is_that_of_mujocos_own_function_and_of_the_files_integrator(integrator, eps, way, steps):
+    """Each way has an eps of its own, a hundred times better than the others; differences of mj_step are worse."""
+    best = {"Euler": (1e-4, 1e-3), "implicit": (1e-6, 1e-5), "RK4": (None, 1e-3)}
+    rows = [row(ways.INVERSE, way=ways.BY_INVERSE, eps=at, error=1e-5) for at in ways.SIZES]
+    rows += [row(ways.INVERSE, way=ways.NUMPY, eps=None, error=1e-15)]
+    for name, of_ways in best.items():
+        for by, at in zip((ways.TRANSITION, ways.BY_STEPS), of_ways):
+            least = 1e-10 if by == ways.TRANSITION else 1e-8
+            for side, larger in ((ways.CENTRED, 1.0), (ways.ONE_SIDED, 10.0)):
+                errors = {size: larger * least * (1.0 if size == at else 100.0) for size in ways.SIZES}
+                rows += [row(f"A and B, {name}", way=f"{by}, {side}", eps=size, error=error)
+                         for size, error in errors.items() if at]  # fmt: skip
+    result = ways.DerivativesResult("derivatives", rows=rows)
+    add_advice(result, rows, [], integrator, False)
+    said = say(result.top[0])
+    assert f"steps with {integrator} by {way} (A" in said and f": use eps {eps:.1g}, centred" in said
+    assert ("By differences of mj_step (A and B), centred: eps" in said) == (steps is not None)
+    assert steps is None or f"centred: eps {steps:.1g}, 1e-08" in said
+    assert say(result.headline).endswith(f"({way}, {integrator})")
+    *_, caption = draw_errors(result)
+    assert f"a step with {integrator} and of the inverse dynamics, the largest at 1 state (swing: 1)" in say(
+        caption
+    )
+    drawn = worst_of_each_eps(line for line in result.drawn if line.way == f"{way}, centred")
+    assert min(drawn, key=lambda size: drawn[size].size) == eps  # as the figure has it
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "RK4"])
+def test_all_scenes_have_the_files_integrator(integrator):
+    xml = FREE_WITH_HINGE.replace("<mujoco>", f'<mujoco><option integrator="{integrator}"/>')
+    setup = setup_of_file(xml)
+    tasks: list[ways.Task] = []
+    begin(dataclasses.replace(setup, map=lambda _, given: tasks.extend(given)))
+    assert {task.subject.kind for task in tasks} == {"scene", "stiff", "singular"}
+    assert all(integrator in task.integrators for task in tasks)
 
 
 def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):

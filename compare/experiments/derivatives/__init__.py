@@ -13,7 +13,9 @@ from ...core.check import About
 from ...core.finding import Finding
 from ...engines import LABELS, RECORDS
 from ...engines.mujoco import Mujoco
+from ...engines.mujoco.engine import methods_for
 from ...engines.mujoco.forces import forces_near
+from ...engines.mujoco.names import INTEGRATORS as MEMBERS
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
 from ...engines.outside import OutsideDynamics
@@ -26,14 +28,14 @@ from ...stability.rest import rest_near
 from .. import Drawing, Experiment
 from ..setup import Setup
 from . import ways
-from .subjects import all_subjects, dynamics_of
+from .subjects import Subject, all_subjects, dynamics_of
 from .ways import EXACT, FORWARD, ContactRow, CostRow, DerivativeRow, DerivativesResult, Measured, Task
 
 EXPERIMENT = Experiment(order=105, serves_own=False, timed=True, quick_speeds=8)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
 FEW_SPEEDS = 8  # of a robot with all integrators: of others they take minutes
 INTEGRATORS = "Euler", "implicitfast", "implicit", "discrete", "RK4"
-FEW_INTEGRATORS = ("implicitfast",)  # of all subjects but the first, unless the experiment runs alone
+USUAL_INTEGRATOR = "implicitfast"  # of robots whose file's own is none of these
 Work = Iterable[list[Measured]]
 
 
@@ -53,8 +55,18 @@ def begin(setup: Setup) -> Work:
     tasks: list[Task] = []
     for subject in all_subjects(setup.robot, setup.random.first(200), dt, states):
         has_all = is_small and (setup.alone or not tasks)
-        tasks.append(Task(subject, INTEGRATORS if has_all else FEW_INTEGRATORS, compiles=not tasks))
+        # of all subjects but the first the file's integrator only, unless the experiment runs alone
+        names = INTEGRATORS if has_all else (integrator_of(setup, subject),)
+        tasks.append(Task(subject, names, compiles=not tasks))
     return setup.map(partial(ways.measured, mujoco=mujoco, dt=dt), tasks)
+
+
+def integrator_of(setup: Setup, subject: Subject) -> str:
+    """The integrator of the robot's model, of which a step's derivatives are advised; implicitfast where it is not compared."""
+    model = cast(Mujoco, setup.engines["mujoco"]).model
+    compared = [name for name in INTEGRATORS if name in methods_for(subject.tree)]
+    same = (name for name in compared if MEMBERS[name] == model.opt.integrator)
+    return next(same, USUAL_INTEGRATOR)
 
 
 def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
@@ -75,7 +87,8 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     add_costs(result, scenes, main)
     hard = [measured for measured in every if measured.subject.kind != "scene"]
     in_air = any(feature.feature == "contact" for feature in setup.robot.features)
-    add_advice(result, scenes, hard, in_air)
+    integrator = integrator_of(setup, main[0].subject)
+    add_advice(result, scenes, hard, integrator, in_air)
     if setup.alone and in_air:
         add_contacts(setup, result)
     return result
@@ -195,35 +208,48 @@ def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
 
 
 def add_advice(
-    result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured], in_air: bool
-) -> None:
-    """Which eps to use, what it costs, and where that fails. in_air: contacts are left out."""
+    result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured], integrator: str,
+    in_air: bool,
+) -> None:  # fmt: skip
+    """Which eps to use, by MuJoCo's own function where it takes the integrator; where that fails. in_air: no contacts."""
     by_eps = [row for row in scenes if row.eps]
-    one_sided = [row for row in by_eps if row.way.endswith(ways.ONE_SIDED)]
+    step = [row for row in by_eps if row.quantity == ways.step_name(integrator)]
+    inverse = [row for row in by_eps if row.quantity == ways.INVERSE]
+    centred = [row for row in step if row.way.endswith(ways.CENTRED)]
+    by_function = [row for row in centred if row.way.startswith(ways.TRANSITION)]
+    way = ways.TRANSITION if by_function else ways.BY_STEPS
+    one_sided = [row for row in step if row.way == f"{way}, {ways.ONE_SIDED}"]
+    result.drawn, result.integrator = step + inverse, integrator
     values: dict[str, Any] = {
-        "centred": ways.best_of(row for row in by_eps if row.way.endswith(ways.CENTRED)),
+        "way": way,
+        "integrator": integrator,
+        "centred": ways.best_of(by_function or centred),
+        "by_steps": ways.best_of(row for row in centred if row not in by_function) if by_function else None,
         "one_sided": ways.best_of(one_sided),
         "usual": ways.worst_of_each_eps(one_sided)[ways.USUAL],
-        "inverse": ways.best_of(row for row in by_eps if row.quantity == ways.INVERSE),
+        "inverse": ways.best_of(inverse),
         "exact": ways.best_of(row for row in scenes if row.way in EXACT),
         "in_air": in_air,
     }
-    result.headline = result.finding("headline", centred=values["centred"])
+    result.headline = result.finding("headline", way=way, integrator=integrator, centred=values["centred"])
     result.top.append(result.finding("advice", **values))
     pairs = []
     for measured in hard:
         if measured.quantity.name != FORWARD:
-            at_scenes = ways.best_of(row for row in by_eps if is_tried(row, measured.quantity.name))
-            rows_here = [row for row in measured.rows if row.eps and is_tried(row, measured.quantity.name)]
+            name = measured.quantity.name
+            at_scenes = ways.best_of(tried(by_eps, name))
+            rows_here = tried([row for row in measured.rows if row.eps], name)
             pairs.append(
                 {"row": ways.worst_of_each_eps(rows_here)[at_scenes.eps or 0.0], "scenes": at_scenes}
             )
     result.find("hard", pairs=pairs)
 
 
-def is_tried(row: DerivativeRow, quantity: str) -> bool:
-    """Whether a row is of a quantity, and of steps a centred difference."""
-    return row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)
+def tried(rows: Sequence[DerivativeRow], quantity: str) -> list[DerivativeRow]:
+    """The rows of a quantity by MuJoCo's own function, of steps centred; by differences of mj_step where there is none."""
+    same = [row for row in rows if row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)]
+    by_function = [row for row in same if not row.way.startswith(ways.BY_STEPS)]
+    return by_function or same
 
 
 def figures(result: DerivativesResult, robot: Robot) -> Iterator[Drawing]:

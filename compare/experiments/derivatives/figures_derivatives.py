@@ -15,8 +15,8 @@ LOGARITHMIC: dict[str, Any] = {"xscale": "log", "yscale": "log"}
 
 
 def draw_errors(result: DerivativesResult) -> tuple[str, Figure, Finding]:
-    """The error of each way at the main subject against eps, the largest of all integrators."""
-    rows = [row for row in result.rows if row.subject == result.main]
+    """The error of each way along all scenes against eps, of the integrator for which an eps is advised."""
+    rows = result.drawn
     fig = Figure(figsize=(WIDTH, 4.2), layout="constrained")
     ax = fig.subplots()
     ways = dict.fromkeys(row.way for row in rows if row.eps)
@@ -26,13 +26,17 @@ def draw_errors(result: DerivativesResult) -> tuple[str, Figure, Finding]:
         }
         look = {"color": colour, "linestyle": dash, "marker": marker, "markersize": 4}
         ax.plot(list(errors), list(errors.values()), label=way, **look)
-    exact = best_of(row for row in rows if row.way in EXACT).size
+    drawn = {(row.subject, row.quantity) for row in rows}
+    exact = best_of(
+        row for row in result.rows if row.way in EXACT and (row.subject, row.quantity) in drawn
+    ).size
     ax.axhline(max(exact, LEAST), color=GREY, linestyle=":", linewidth=1.5, label="tmt's exact derivatives")
     ax.set(
         **LOGARITHMIC, xlabel="eps of the difference, rad, m, rad/s, m/s, N m or N", ylabel="relative error"
     )
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    caption = result.finding("errors_caption", subject=result.main, states=rows[0].states)
+    states = {row.subject: row.states for row in rows}
+    caption = result.finding("errors_caption", states=states, integrator=result.integrator)
     return "derivatives_errors", fig, caption
 
 

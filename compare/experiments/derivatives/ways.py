@@ -31,6 +31,7 @@ Units = Sequence[tuple[str, str]]  # of movements, of speeds ...: of turns, of s
 SIZES = tuple(10.0**-k for k in range(2, 12))  # of differences
 USUAL = 1e-6  # of mjd_transitionFD in MuJoCo's own samples
 ONE_SIDED, CENTRED = "one-sided", "centred"
+TRANSITION, BY_STEPS = "mjd_transitionFD", "differences of mj_step"
 BY_INVERSE, NUMPY, COMPILED = "mjd_inverseFD", "tmt, NumPy", "tmt, compiled"
 EXACT = NUMPY, COMPILED
 INVERSE, FORWARD = "dtau/dq and dtau/dqd", "dqdd/dq, dqdd/dqd and dqdd/dtau"
@@ -86,7 +87,9 @@ class ContactRow(Row):
 class DerivativesResult(Result):
     """Its result: what its figure needs, too."""
 
-    main: str = ""  # the subject that is drawn
+    main: str = ""  # the subject that is timed
+    integrator: str = ""  # of which the eps of a step is advised
+    drawn: Sequence[DerivativeRow] = ()  # from which it is, and those of the inverse dynamics
     times: dict[tuple[str, str], float] = field(default_factory=dict)  # s, by quantity and way
 
 
@@ -143,7 +146,7 @@ class Quantity(NamedTuple):
         if self.name == INVERSE:
             a = accelerations(subject)[k]
             yield Way(BY_INVERSE, False, lambda eps: of_inverse(dynamics, q, qd, a, eps))
-        functions = {"mjd_transitionFD": of_transition, "differences of mj_step": of_steps}
+        functions = {TRANSITION: of_transition, BY_STEPS: of_steps}
         for (side, centred), (name, function) in product(
             ((ONE_SIDED, False), (CENTRED, True)), functions.items()
         ):
@@ -170,11 +173,15 @@ def side_by_side(values: Array) -> Array:
     return values if values.ndim == 3 else np.concatenate(values[:, :3].swapaxes(0, 1), axis=2)
 
 
+def step_name(integrator: str) -> str:
+    return f"A and B, {integrator}"
+
+
 def quantities(subject: Subject, integrators: Sequence[str]) -> list[Quantity]:
     """The derivatives of accelerations and torques, and of a step of each of these integrators of MuJoCo."""
     methods = methods_for(subject.tree)
     steps = [
-        Quantity(f"A and B, {name}", f"step_derivatives:{methods[name].scheme}", STATE, name)
+        Quantity(step_name(name), f"step_derivatives:{methods[name].scheme}", STATE, name)
         for name in integrators
         if name in methods
     ]
