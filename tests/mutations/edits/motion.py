@@ -74,6 +74,7 @@ EDITS = (
     ("derivatives.ways", "share_of_differences", "(_1 + left_out) / eps", "30 * _0", "rounding of differences x 30"),
     ("derivatives.ways", "share_of_differences", "np.fmax(*terms)", "terms[0]", "one eps tells the truncation"),
     ("derivatives", "contact_rows", "(nudge, -nudge)", "(nudge, nudge)", "contacts are looked at on one side"),
+    ("derivatives", "add_advice", "by_function or centred", "centred", "any way decides the eps that is advised"),
     ("derivatives", "of_mujoco", "max(*_1)", "min(*_1)", "tmt is compared with MuJoCo's worse way"),
     ("derivatives", "add_costs", "1e6 * seconds", "1e3 * seconds", "a millisecond is called a microsecond"),
     ("derivatives.subjects", "stiff", "2.0 * inertia * rate", "20.0 * inertia * rate", "dampers are not critical"),

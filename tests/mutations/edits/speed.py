@@ -21,6 +21,8 @@ EDITS = (
     ("evaluations", "costs", "row.operations / _1", "_1 / row.operations", "a rate is inverted"),
     ("conclusions", "order_in", "clear < run.early < REGULAR", "True", "the order is measured among errors of rounding"),
     ("judge.order", "LEAST_ORDER", "7.0", "1.0", "order 8 need only be 1"),
+    ("judge.order", "check_order", "abs(measured - twin)", "0.0", "a higher order than tmt's passes"),
+    ("judge.order", "check_order", "nominal - measured", "0.0", "an order that is too low passes"),
     ("truth.reference", "coarsest_steps", "RECORDS if case.controller else _1", "_1", "steps of a step response begin fine"),
     ("conclusions", "check_same_schemes", "max(FACTOR, _1)", "1e6", "the same scheme: 64 -> 1e6"),
     ("conclusions", "check_smallest_errors", "FACTOR * scene.floor", "100 * FACTOR * scene.floor", "tolerance x 100"),
