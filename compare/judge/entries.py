@@ -15,11 +15,12 @@ W is the largest of all L_i: MuJoCo adds moments about the centre of mass of the
 to m W^2 leave m L_i^2, and each is rounded by eps: 64 eps (W / 8)^2. R is the largest distance of the body
 from the world's origin: its position, and so each of its levers, is rounded by eps R. Every term of a body is
 multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the rounding of
-those before it and adds its own. A movement of joint j changes at most four factors of a term,
-a lever and those of an acceleration: of a turn each by its own size, so that the scale of d(Mbar qdd + h)/dq_j is
-four times that of the terms of the bodies that j moves; of a slide levers by 1, accelerations by S^2. Where a
-system is solved, errors of eps in Mbar and in the forces are multiplied by |Mbar^-1|, entry by entry: a condition
-number would depend on the units.
+those before it and adds its own. Bodies that MuJoCo fuses one after another are turned into the principal axes of
+each sum and back, all that are in it: k is then multiplied by the number of them. A movement of joint j changes
+at most four factors of a term, a lever and those of an acceleration: of a turn each by its own size, so that the
+scale of d(Mbar qdd + h)/dq_j is four times that of the terms of the bodies that j moves; of a slide levers by 1,
+accelerations by S^2. Where a system is solved, errors of eps in Mbar and in the forces are multiplied by
+|Mbar^-1|, entry by entry: a condition number would depend on the units.
 """
 
 from functools import cached_property
@@ -41,9 +42,12 @@ def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str
 
 
 class Entries:
-    """Scales at q (states, nq), qd (states, nv), each of a shape that broadcasts to that of its quantity."""
+    """Scales at q (states, nq), qd (states, nv), each of a shape that broadcasts to that of its quantity.
 
-    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0):
+    fused: with how many each body is fused into one, itself among them, 1 or (m,).
+    """
+
+    def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0, fused: ArrayLike = 1):
         self.tree, self.q = tree, q
         self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
         from_joints, self.reach = levers(tree, q)
@@ -51,7 +55,7 @@ class Entries:
             from_joints = from_joints[:1]
         joints_of_bodies = np.array([tree.moves(b) for b in range(len(tree.mass))])
         is_turn = np.array(tree.kind) != "slide"
-        self.count = np.maximum(1, (joints_of_bodies & is_turn).sum(axis=1))  # k, (m,)
+        self.count = np.maximum(1, (joints_of_bodies & is_turn).sum(axis=1)) * fused  # k, (m,)
         self.of_speed = [i for i, joint in enumerate(tree.coordinates.joints) for _ in tree.axis[joint.qd]]
         moved, turns = joints_of_bodies[:, self.of_speed], is_turn[self.of_speed]
         self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)

@@ -53,8 +53,13 @@ def rows(setup: Setup) -> ReductionResult:
             result.check(
                 "every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM
             )
-    if setup.reading and not robot.is_stated and is_asked(setup):
-        of_file.add(result, setup, setup.reading)
+    if setup.reading and not robot.is_stated:
+        if is_asked(setup):
+            of_file.add(result, setup, setup.reading)
+        elif subsets := result.tables.get("reduction_subsets"):
+            failing = sum(not check.passed for check in result.checks if check.rounding)
+            count = len({row.locked for row in subsets})
+            result.top.append(result.finding("blocks", count=count, failing=failing))
     result.top += answers(result, robot)
     return result
 

@@ -62,6 +62,8 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
         "whole": rows[0],
         "scene": {"name": scene.name, "duration": scene.duration},
         "names": list(locked),
+        "actuators": actuators_gone(scene.whole, small),
+        "of_actuators": number_of_actuators(scene.whole.model),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
         "stands": max(scene.use.ranges.values(), default=0.0) <= STILL,
@@ -118,6 +120,12 @@ def add_tables(
     result.tables["reduction_near"] = [PairRow(*pair, distance) for pair, distance in pairs.items()]
 
 
+def actuators_gone(whole: Smaller, small: Smaller) -> list[str]:
+    """Those of locked joints, and those without force."""
+    names = {actuator.name for actuator in small.spec.actuators}
+    return [actuator.name for actuator in whole.spec.actuators if actuator.name not in names]
+
+
 def use_of(scene: Scene) -> list[UseRow]:
     """What the file has and the motion used."""
     use, model = scene.use, scene.whole.model
@@ -166,7 +174,9 @@ def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tre
     """Mbar and the bias of a Tree with joints locked, and of the smaller model, at random states."""
     coordinates, rng = Coordinates(tree.joint_names, tree.kind), np.random.default_rng(SEED)
     q, v = coordinates.random(rng, STATES), rng.uniform(-1.0, 1.0, (STATES, coordinates.nv))
-    scale = Entries(tree, q, v)
+    bodies, others = tree.body_joint, smaller.body_joint
+    fused = np.array([bodies.count(joint) - others.count(joint) + 1 for joint in bodies])
+    scale = Entries(tree, q, v, np.maximum(1, fused))
     masses = tmt.mass_matrix(q, model=tree) - tmt.mass_matrix(q, model=smaller)
     biases = tmt.bias(q, v, model=tree) - tmt.bias(q, v, model=smaller)
     compared = (("Mbar", masses, scale.mass_matrix), ("bias", biases, scale.bias))

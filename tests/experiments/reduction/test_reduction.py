@@ -89,6 +89,20 @@ def test_of_many_joints_some_are_locked_each_alone():
     assert not blocks(setup_of_file(chain(60))).checks
 
 
+def test_a_quick_run_of_a_file_says_what_it_answered(monkeypatch):
+    setup = setup_of_file(PATHS["gripper"])
+    (told,) = map(say, reduction.rows(setup).top)
+    assert told.startswith(
+        "With 14 choices of joints locked, Mbar and the bias are the blocks of the whole model's;"
+    )
+    monkeypatch.setattr(sub_blocks, "FACTOR", 0.0)
+    result = reduction.rows(setup)
+    (told,) = map(say, result.top)
+    assert (
+        failed(result) and f"only in part: {len(failed(result))} checks fail; reduction --mjcf FILE" in told
+    )
+
+
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
     body = '<body><joint axis="0 1 0"/><geom size="0.1 0.2 0.3" type="box" pos="0.1 0.2 1"/></body>'
     aligned = f'<body><freejoint align="true"/><geom size="0.1" pos="0.05 0 0"/>{body}</body>'

@@ -144,6 +144,7 @@ def test_the_idle_arm_is_locked_and_the_written_file_does_the_same_motion(two_ar
     digits = result.top[0].values["facts"]["digits"]
     assert abs(check.value - best.error) <= digits < 1e-5  # of six digits
     text = path.read_text(encoding="utf-8")
+    assert "3 of 5 actuators go: right upper, right lower, unused." in text
     assert "home" in text and "run, error 0.001" in text and "right upper" in text  # the comment
 
 
@@ -300,8 +301,26 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
     result = answered(HAND, controls=waves("index"), error=1e-2)
     assert {"thumb", "thumb tip"} <= {row.joint for row in result.tables["reduction_joints"] if row.locked}
     assert "index" not in {row.joint for row in result.tables["reduction_joints"] if row.locked}
+    told = say(result.top[0])
+    assert "2 of 3 actuators go: wrist and thumb." in told
+    facts = result.top[0].values["facts"] | {"of_actuators": 2}
+    assert "go: wrist and thumb; the smaller model has none." in say(
+        replace(result.top[0], values={"facts": facts})
+    )
     steps = [row for row in result.tables["reduction_frontier"] if row.error_of_step != row.error]
     assert steps and all(row.locked for row in steps)  # of the others the whole error is that of the step
+
+
+def test_errors_of_the_model_and_of_the_step_are_no_parts_of_the_whole(two_arms):
+    """They may cancel each other."""
+    (top, *_), path = two_arms[0].top, two_arms[1]
+    facts = top.values["facts"]
+    row = replace(facts["chosen"].row, error=4e-3, error_of_model=6e-3, error_of_step=2e-3)
+    told = say(
+        replace(top, values={"facts": facts | {"chosen": facts["chosen"]._replace(allowed=1e-2, row=row)}})
+    )
+    assert "error 4 mrad (of the model alone 6 mrad, of the step alone 2 mrad)" in told
+    assert "of that" not in told + path.read_text(encoding="utf-8")
 
 
 def test_after_a_joint_that_costs_too_much_others_are_tried():
@@ -365,6 +384,37 @@ def test_bodies_that_the_file_fuses_are_fused_in_the_smaller_one_too():
         "right upper",
         "right lower",
     }
+
+
+def many_legs(rng):
+    """A free trunk with 24 legs."""
+    legs = "".join(
+        f"""<body pos="{numbers(rng, 0.1)}"><joint name="leg {leg}" axis="{numbers(rng, 1.0)}"/>
+        <inertial pos="{numbers(rng, 0.05)}" mass="0.5" diaginertia="1e-3 1.2e-3 1.9e-3" quat="{numbers(rng, 1.0, 4)}"/></body>"""
+        for leg in range(24)
+    )
+    trunk = '<freejoint name="base"/><inertial pos="0.01 0 0" mass="5" diaginertia="0.1 0.12 0.2" quat="1 2 3 4"/>'
+    return f"<mujoco><worldbody><body>{trunk}{legs}</body></worldbody></mujoco>"
+
+
+def numbers(rng, size, count=3):
+    return " ".join(map(str, size * rng.normal(size=count)))
+
+
+def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
+    """An error of 1e-11 is still seen."""
+    rng = np.random.default_rng(1)
+    whole = Smaller.whole(Source(many_legs(rng)))
+    legs = {f"leg {leg}": rng.uniform(-2.0, 2.0, 1) for leg in range(24)}
+    small = search.locked(whole, legs)
+    assert small.model.nbody == 2
+    locked = read(whole.model).tree.lock({name: float(q[0]) for name, q in legs.items()})
+    smaller = read(small.model).tree
+    heavier = replace(smaller, mass=tuple((1.0 + 1e-11) * mass for mass in smaller.mass))
+    for other, passed in ((smaller, True), (heavier, False)):
+        result = ReductionResult("reduction")
+        of_file.compare_locked(result, "legs locked", locked, other)
+        assert all(check.passed for check in result.checks) is passed
 
 
 def test_a_file_whose_own_run_fails_is_not_judged():

@@ -60,6 +60,7 @@ EDITS = (
     ("reduction.of_file", "add_checks", "scene.run(written, *_1)", "scene.run(small, *_1)", "no file is read"),
     ("reduction.of_file", "compare_locked", "tmt.mass_matrix(q, model=smaller)", "tmt.mass_matrix(q, model=tree)", "same M"),
     ("reduction.of_file", "compare_locked", "tmt.bias(q, v, model=smaller)", "tmt.bias(q, v, model=tree)", "same bias"),
+    ("reduction.of_file", "compare_locked", "np.maximum(1, fused)", "1", "a fusing of bodies rounds nothing"),
     ("reduction.of_file", "add_tables", "(number, number + 1)", "(0, number + 1)", "each kind is taken out of the whole"),
     ("mujoco.smaller", "finished", "data.qpos", "small.model.qpos0", "a smaller file starts at qpos0"),
     ("mujoco.smaller", "finished", "data.ctrl", "0.0 * data.ctrl", "a smaller file starts without controls"),
