@@ -15,6 +15,7 @@ from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import MotionRow, motion
 from ...stability.place import MOST_POSTURES, Posture, posture_of, postures_of, standing_at
 from ...stability.runs import USUAL_PUSH
+from ...stability.start import CALM
 from ..setup import Request, Setup
 from . import own_run
 from .tables import ControlRow, OwnRunRow, StabilityResult
@@ -191,7 +192,7 @@ def add_answer(
     tell(
         "answer", row=worst, saddle=next((row for row in mine if row.limit == "saddle"), None), others=others,
         air=next((row for row in air if row is not worst and row.is_known), None), run=None if is_calm else runs[0],
-        requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=own_run.CALM,
+        requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=CALM,
     )  # fmt: skip
     if is_calm:
         tell("own_run", run=runs[0], others=len(runs) - 1)
