@@ -18,6 +18,7 @@ from .growth import Growth
 from .limits import LONGEST, Curve, Limit, limit, tried
 from .place import MOVING, Place, Posture, in_the_air_at, standing_at
 from .rest import SETTLED, Rest
+from .start import StartRuns
 
 UNHELD = 0.99  # of a limit: lower ones without dry friction
 SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
@@ -35,6 +36,7 @@ class StepLimitRow(Row):
     limit: finite, none, below, saddle, or no_rest, see limits.Limit; moving, it moves on where others rest.
     observed_dt, failing_dt: the longest step at which runs hold and the shortest at which they fail; failing_dt alone is None
     where they hold up to the longest that is tried.
+    start_dt: the longest step up to which a run from the posture itself comes to rest where it rests, where that is lower.
     smooth_dt: the limit without dry friction, where that is lower. growth: per step, at the file's step; apart: in closed form
     minus that. growth_rate: just beyond the limit; of a saddle that of its fall. finer_push: whether a finer step bears no
     larger push, asked below the usual push. moved: from the posture to the rest. has_fallen: by a free body.
@@ -49,6 +51,7 @@ class StepLimitRow(Row):
     predicted_dt: float | None = step_column()
     observed_dt: float | None = step_column(default=None)
     failing_dt: float | None = step_column(default=None)
+    start_dt: float | None = step_column(default=None)
     smooth_dt: float | None = step_column(default=None)
     file_dt: float = column("s")
     file_integrator: str
@@ -181,6 +184,8 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
         add_smooth_limit(row, place)
     if row.is_known:
         row.stable_at_file_dt = dt <= row.longest
+    if row.stable_at_file_dt and asked.in_runs and integrator == asked.integrator and row.limit != "moving":
+        row.start_dt = StartRuns(place, integrator).longest(dt, row.longest) if place.contacts else None
     return row, found
 
 

@@ -207,6 +207,7 @@ class WholeRun(NamedTuple):
 
     speeds: np.ndarray  # root mean square of all speeds in each part, rad/s and m/s; NaN from where it fails
     failed_at: float | None  # s: MuJoCo warns of a bad number; None: it runs on
+    end: np.ndarray  # the last state
 
 
 def whole_run(
@@ -218,7 +219,7 @@ def whole_run(
     for k, data in enumerate(step.run(start, parts * count)):
         squares[k] = data.qvel @ data.qvel / model.nv
     speeds, failed = squares.reshape(parts, count).mean(axis=1), np.flatnonzero(~np.isfinite(squares))
-    return WholeRun(np.sqrt(speeds), float(failed[0] + 1) * dt if len(failed) else None)
+    return WholeRun(np.sqrt(speeds), float(failed[0] + 1) * dt if len(failed) else None, step.state())
 
 
 def start_of(

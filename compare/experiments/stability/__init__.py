@@ -10,7 +10,8 @@ from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...stability.held import held
 from ...stability.limits import LONGEST
-from ...stability.runs import USUAL_PUSH
+from ...stability.runs import FAR, USUAL_PUSH
+from ...stability.start import CALM, PUSH
 from .. import Drawing, Experiment
 from ..setup import Setup
 from . import claims, departure, limits, of_file, own_run
@@ -38,7 +39,13 @@ def claim_values(robot: Robot) -> dict[str, Any]:
         "up_to": LONGEST,
         "far": of_file.FAR,
         "creeps": of_file.CREEPS,
-        "run": {"push": own_run.PUSH, "calm": own_run.CALM, "faster": own_run.FASTER, "finer": own_run.FINER},
+        "run": {
+            "push": PUSH,
+            "calm": CALM,
+            "far": FAR,
+            "faster": own_run.FASTER,
+            "finer": own_run.FINER,
+        },
     }
 
 

@@ -15,6 +15,7 @@ from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import MotionRow, motion
 from ...stability.place import MOST_POSTURES, Posture, posture_of, postures_of, standing_at
 from ...stability.runs import USUAL_PUSH
+from ...stability.start import CALM
 from ..setup import Request, Setup
 from . import own_run
 from .tables import ControlRow, OwnRunRow, StabilityResult
@@ -171,7 +172,10 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
 def add_answer(
     result: StabilityResult, places: Sequence[PlaceAnswer], step: AtStep, runs: Sequence[OwnRunRow]
 ) -> None:
-    """The sentence about the step, the limits of all postures, and after it what matters. runs: with the worst outcome."""
+    """The sentence about the step, the limits of all postures, and after it what matters. runs: with the worst outcome.
+
+    The limits of the other integrators are those that were found for the file's step.
+    """
 
     def tell(kind: str, **values: Any) -> None:
         result.top.append(result.finding(kind, OF, **values))
@@ -188,7 +192,7 @@ def add_answer(
     tell(
         "answer", row=worst, saddle=next((row for row in mine if row.limit == "saddle"), None), others=others,
         air=next((row for row in air if row is not worst and row.is_known), None), run=None if is_calm else runs[0],
-        requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=own_run.CALM,
+        requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=CALM,
     )  # fmt: skip
     if is_calm:
         tell("own_run", run=runs[0], others=len(runs) - 1)
@@ -205,8 +209,18 @@ def add_answer(
                 tell("rest", row=first, far=FAR, creeps=CREEPS)
     if worst and worst.stable_at_file_dt is False:
         cures = next(place.cures for place in places if worst in place.rows)
-        stable = [row.integrator for row in others if row.stable_at_file_dt]
-        tell("cures", row=worst, integrators=stable, cures=cures)
+        limits = others_at(worst, [*rows, *result.tables.get("step_limits", ())])
+        stable = [row.integrator for row in limits if worst.file_dt <= row.longest]
+        tell("cures", row=worst, tried=[row.integrator for row in limits], integrators=stable, cures=cures)
+
+
+def others_at(row: StepLimitRow, rows: Iterable[StepLimitRow]) -> list[StepLimitRow]:
+    """The known limits of other integrators where a row is, one of each."""
+    known = [other for other in rows if other.is_known and other.integrator != row.integrator]
+    here = [
+        other for other in known if (other.posture, other.surroundings) == (row.posture, row.surroundings)
+    ]
+    return list({other.integrator: other for other in here}.values())
 
 
 def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: StepLimitRow | None) -> None:

@@ -3,25 +3,18 @@
 from collections.abc import Iterable
 from functools import partial
 
-import numpy as np
-
 from ...core.check import About, Result
 from ...engines.mujoco import Reading
 from ...engines.mujoco.names import on
-from ...engines.mujoco.step import WholeRun, start_of, whole_run
+from ...engines.mujoco.step import WholeRun
 from ...judge.run import number_or_none
-from ...robots.case import SEED
 from ...robots.file import names_of_keys
-from ...stability.place import MOST_POSTURES
+from ...stability.place import MOST_POSTURES, Posture, standing_at
+from ...stability.start import CALM, StartRuns, is_calm
 from ..setup import Setup
 from .tables import OwnRunRow
 
-LASTS, LEAST_STEPS, MOST_STEPS = 2.0, 1000, 20_000  # s, and between which numbers of steps it lasts
-LONGER = 3.0  # fold: where it has not come to rest it is run so long
-PARTS = 4  # of a run: the speeds of each are averaged
 FINER = 16  # the step over the finer one
-PUSH = 1e-6  # rad/s or m/s at the start, by chance: what rests exactly would stay, however unstable
-CALM = 1e-3  # rad/s or m/s, root of the mean square
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
 ORDER = ("worse", "fails", "alike", "calm")  # of what is told first
@@ -36,36 +29,33 @@ def begin(setup: Setup, reading: Reading, dt: float, integrator: str) -> Iterabl
 def own_run(key: str, dt: float, integrator: str, reading: Reading) -> OwnRunRow:
     """What the file does from a keyframe (or from qpos0, if the name is empty): a row of own_run.csv.
 
-    outcome: calm, it comes to rest; worse, it diverges or moves on, and at a finer step it does not; alike, it moves on there
-    too; fails, it diverges there too.
+    outcome: calm, it comes to rest where the posture rests; worse, it diverges, moves on, or comes to rest elsewhere, and at a
+    finer step it does not; alike, it does so there too; fails, it diverges there too.
     """
-    push = PUSH * np.random.default_rng(SEED).normal(size=reading.model.nv)
-    start, finer_dt = start_of(reading.model, reading.drive, key, push), dt / FINER
-    lasts = float(np.clip(LASTS, LEAST_STEPS * dt, MOST_STEPS * dt))
-
-    def run(step: float) -> WholeRun:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return whole_run(reading.model, start, step, integrator, lasts, PARTS)
-
-    own, outcome, finer = run(dt), "calm", None
-    if not (is_calm(own) or own.failed_at):
-        lasts *= LONGER
-        own = run(dt)
-    if not is_calm(own):
-        finer = run(finer_dt)
-        outcome = "worse" if is_worse(own, finer) else "fails" if own.failed_at else "alike"
+    name = names_of_keys(reading).get(key, "qpos0")
+    starts = StartRuns(standing_at(reading, Posture(name, key)), integrator)
+    finer_dt, outcome, finer = dt / FINER, "calm", None
+    own, lasts = starts.until_rest(dt)
+    moved = starts.moved(own, lasts) if is_calm(own) else None
+    if moved is None or moved.is_elsewhere:
+        finer = starts.run(finer_dt, lasts)
+        worse = is_worse(own, finer) if moved is None else ends_at_rest(starts, finer, lasts)
+        outcome = "worse" if worse else "fails" if own.failed_at else "alike"
     failed = own.failed_at is not None
     return OwnRunRow(
-        start=names_of_keys(reading).get(key, "qpos0"), dt=dt, integrator=integrator, outcome=outcome,
+        start=name, dt=dt, integrator=integrator, outcome=outcome,
         failed_at=own.failed_at, full_model_rms_speed=number_or_none(own.speeds[-1]),
         full_model_warnings=int(failed), full_model_resets=int(failed and on(reading.model, "AUTORESET")),
         full_model_calm=is_calm(own), finer_dt=finer and finer_dt,
         finer_rms_speed=finer and number_or_none(finer.speeds[-1]),
+        moved=moved and moved.by, moved_joint=moved.joint if moved else "",
+        rests_elsewhere=bool(moved and moved.is_elsewhere), has_fallen=bool(moved and moved.has_fallen),
     )  # fmt: skip
 
 
-def is_calm(run: WholeRun) -> bool:
-    return bool(run.speeds[-1] < CALM)
+def ends_at_rest(starts: StartRuns, run: WholeRun, lasts: float) -> bool:
+    """Whether a run ends where its posture rests, still or nearly so."""
+    return not run.failed_at and not starts.moved(run, lasts).is_elsewhere
 
 
 def is_worse(own: WholeRun, finer: WholeRun) -> bool:

@@ -94,6 +94,10 @@ class OwnRunRow(Row):
     full_model_calm: bool
     finer_dt: float | None = column("s")
     finer_rms_speed: float | None
+    moved: float | None = None  # rad or m, of a run that comes to rest: from the rest of the posture
+    moved_joint: str = ""
+    rests_elsewhere: bool = False
+    has_fallen: bool = False
 
 
 @dataclass(kw_only=True)

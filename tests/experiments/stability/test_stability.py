@@ -178,7 +178,7 @@ def test_what_moves_on_by_its_step_alone_is_not_stable(source, outcome):
     (np.nan, 1.0, True),
 ])  # fmt: skip
 def test_ten_times_the_speed_at_the_finer_step(own, finer, worse):
-    runs = [WholeRun(np.full(4, speed), None) for speed in (own, finer)]
+    runs = [WholeRun(np.full(4, speed), None, np.zeros(0)) for speed in (own, finer)]
     assert own_run.is_worse(*runs) is worse
     # a motion that goes on is bounded by its fastest part
     fast = runs[1]._replace(speeds=np.array([100.0, 1.0, 1.0, finer]))

@@ -138,6 +138,17 @@ def test_changes_that_help_are_those_at_the_posture_that_is_told(result):
     assert result.top[-1].values["cures"] == [Cure("q", 2.0)]
 
 
+@pytest.mark.parametrize("longest, stable", [(0.16, ["RK4"]), (0.09, [])])
+def test_integrators_whose_limit_is_above_a_requested_step_make_it_stable(result, longest, stable):
+    """The requested step is asked of its own integrator alone; the limits of the others are those of the file's step."""
+    elsewhere = step_row(posture="q", integrator="discrete")
+    result.tables["step_limits"] = [step_row(), step_row(integrator="RK4", predicted_dt=longest), elsewhere]
+    row = step_row(predicted_dt=0.02, stable_at_file_dt=False)
+    step = of_file.AtStep(Asked(0.1, "Euler", []), True, (), ())
+    of_file.add_answer(result, [PlaceAnswer([row], {}, [])], step, [SimpleNamespace(outcome="calm")])
+    assert result.top[-1].values["integrators"] == stable and result.top[-1].values["tried"] == ["RK4"]
+
+
 def test_a_posture_that_is_asked_for_is_the_only_one():
     for asked in ("spin", "qpos0", "5.7"):
         rows = found_of(posture=asked).tables["step_limits"]
