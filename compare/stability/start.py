@@ -102,7 +102,7 @@ class StartRuns:
                 low, high = (step, None) if self.rests(step) else (low, step)
         else:
             while low == first or not self.rests(low):
-                low, high = low / COARSER, low
+                low, high = low / COARSER**2, low
                 if low * FINEST < first:
                     return None
         return bisected(self.rests, low, high, WITHIN)[0] if high else None

@@ -26,6 +26,8 @@ EDITS = (
     ("own_run", "FASTER", "10.0", "1e3", "a run may be a thousand times as fast as at the finer step"),
     ("own_run", "add", "row.outcome in ('alike', 'calm')", "True", "what is not stable in its own run passes"),
     ("own_run", "begin", "list(reading.keyframes)[:MOST_POSTURES]", "list(reading.keyframes)[:1]", "one keyframe is run"),
+    ("stability.start", "StartRuns.moved", "most > FAR + _1", "False", "a robot that has fallen rests"),
+    ("stability.start", "StartRuns.longest", "BELOW * _1", "first", "no step from a posture itself is sought"),
     ("of_file", "begin", "Asked(*step, [step[1]])", "asked[0]", "a requested step is the file's"),
     ("stability.limits", "GIVES_WAY", "0.3", "30.0", "a rest far away is the same"),
     ("stability.place", "Place.has_fallen", "of_base(self.model)", "True", "an arm that sinks has fallen"),
