@@ -26,7 +26,9 @@ def draw_frontier(result: ReductionResult, rows: Sequence[FrontierRow]) -> tuple
     for row in filter(lambda row: row.best_for, rows):
         place = row.error, row.time_of_second
         ax.plot(*place, "ko", markersize=11, markerfacecolor="none")
-        ax.annotate(f"{row.best_for}: ×{row.gain:.1f}", place, (6, -10), textcoords="offset points")
+        gain = f"{row.best_for}: ×{row.gain:.1f}"
+        ax.annotate(gain, place, (0, -16), textcoords="offset points", horizontalalignment="center")
+    ax.margins(0.12)
     handles = [Line2D([], [], color=colour, label=model) for model, colour in colours.items()]
     for name, mark in marks.items():
         handles.append(Line2D([], [], color="black", linestyle="none", marker=mark, label=name))
