@@ -1,4 +1,4 @@
-"""Which checks a run makes: a committed list, so that none is dropped unseen. `python tests/test_checks.py` remakes it."""
+"""Which checks a run makes: a committed list, so that none is dropped unseen. `python -m tests.test_checks` remakes it."""
 
 import re
 from pathlib import Path

@@ -59,7 +59,7 @@ def number(noun: str, least: float, most: float, kind: type[int | float] = float
         with suppress(ValueError):
             if least <= kind(text) <= most:
                 return kind(text)
-        wrong = f"{noun} {text!r}: expected a number from {least:g} to {most:g}"
+        wrong = f"{text!r}: expected a number from {least:g} to {most:g} ({noun})"
         raise argparse.ArgumentTypeError(wrong)
 
     return in_range
