@@ -25,7 +25,7 @@ UNITS = {  # factors of units that are taken for others, and the fields of a tre
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
-EQUAL = 1e-12  # of a moment of inertia: two that are equal but for rounding
+EQUAL = 1e-12  # of a moment of inertia: two that are equal except for rounding
 Edit = tuple[str, str, dict[str, ndarray]]
 Way = Callable[[ndarray], ndarray]
 Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains

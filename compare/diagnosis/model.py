@@ -252,7 +252,7 @@ class Equations:
 
 
 def whole(numbers: ndarray) -> ndarray:
-    """Numbers with those that are whole but for rounding rounded."""
+    """Numbers with those that are whole, except for rounding, rounded."""
     near = np.round(numbers)
     return np.where(np.abs(numbers - near) < WHOLE, near, numbers)
 
