@@ -16,7 +16,7 @@ NOISE_TIMES = 3.0  # fold, of the observed noise: what does not exceed it may be
 NOISE_LEAST = 1e-10  # of an entry of the derivative
 GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
 SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
-LASTS, MOST_STEPS = 4.0, 20_000  # s: of a run, and at most so many steps
+LASTS, MOST_STEPS = 4.0, 20_000  # duration of a run, s; its most steps
 GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 
 
