@@ -9,7 +9,7 @@ import tmt
 from tmt.methods.stepping import stepped
 
 from ...robots.case import Case
-from .. import Course, EngineRecord, Method, Motion, OneByOne, Prepared
+from .. import Course, Engine, EngineRecord, Method, Motion, OneByOne, Prepared
 from .equations import OwnEquations, passive
 from .functions import METHOD_NAMES, QUANTITIES, QUICK, OwnError, Problem
 
@@ -19,10 +19,11 @@ ENGINE = EngineRecord(order=50, label="yours", possessive="your", from_file=True
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
 
 
-class Own:
+class Own(Engine):
     """The engine of a user's equations. schemes: those of RK4_SCHEMES that this robot needs besides rk4."""
 
     name = "own"
+    methods: Mapping[str, Method] = {}
 
     def __init__(self, equations: OwnEquations, schemes: Iterable[str] = ()):
         self.equations, needed = equations, {*schemes, "rk4"}
@@ -32,9 +33,6 @@ class Own:
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         """None if a robot's own actuators act: the equations do not have them."""
         return {} if case.controller else self.methods
-
-    def unavailable(self) -> str | None:
-        return None
 
     def of(self, case: Case) -> "OwnDynamics":
         return OwnDynamics(self.equations, case)
@@ -82,10 +80,6 @@ class OwnDynamics(OneByOne):
 
     def energy(self, q: ndarray, v: ndarray) -> ndarray:
         return self.equations.energy(self.all_q(q), self.all_v(v))
-
-    def potential_energy(self, q: ndarray) -> ndarray:
-        """The energy at rest, J, (...), from the zero of the equations."""
-        return self.energy(q, np.zeros(self.coordinates.nv))
 
     def com_positions(self, q: ndarray) -> ndarray:
         return self.equations.com_positions(self.all_q(q))
