@@ -8,6 +8,7 @@ import numpy as np
 from .step import NUDGE, Step
 
 QUADRATIC = int(mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC)  # a row whose force is linear
+CONTACTS = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)  # the first of their types
 
 
 class Rows(NamedTuple):
@@ -37,14 +38,9 @@ class Forces(NamedTuple):
     daref: np.ndarray
 
 
-def rows(step: Step, on: np.ndarray | None = None) -> Rows | None:
-    """Rows of the data of a step after mj_forward; on: which, (all,), by default those whose force is linear.
-
-    None: their number is another one than that of `on`.
-    """
+def rows(step: Step, on: np.ndarray) -> Rows | None:
+    """Rows of the data of a step after mj_forward; on: which, (all,). None: their number is another one."""
     m, d = step.model, step.data
-    if on is None:
-        on = d.efc_state == QUADRATIC
     if len(on) != d.nefc:
         return None
     J = np.zeros((d.nefc, m.nv))
@@ -52,11 +48,7 @@ def rows(step: Step, on: np.ndarray | None = None) -> Rows | None:
         mujoco.mju_sparse2dense(J, d.efc_J, d.efc_J_rownnz, d.efc_J_rowadr, d.efc_J_colind)
     else:
         J[:] = d.efc_J.reshape(J.shape)
-    contact = np.full(d.nefc, -1)
-    for number, (address, size) in enumerate(zip(d.contact.efc_address, d.contact.dim)):
-        if address >= 0:
-            count = 2 * (size - 1) if m.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and size > 1 else size
-            contact[address : address + count] = number
+    contact = np.where(d.efc_type >= CONTACTS, d.efc_id, -1)
     return Rows(J[on], d.efc_R[on].copy(), d.efc_aref[on].copy(), d.efc_force[on].copy(), contact[on])
 
 

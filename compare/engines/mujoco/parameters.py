@@ -79,9 +79,8 @@ def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
 
 def last_hinge(m: mujoco.MjModel, body: int) -> int:
     """The last hinge that moves a body, by its number, -1: none."""
-    while body and not m.body_jntnum[body]:
-        body = m.body_parentid[body]
-    return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
+    mover = m.body_weldid[body]
+    return int(m.body_jntadr[mover] + m.body_jntnum[mover] - 1) if mover else -1
 
 
 Options = Mapping[str, bool]  # of the file, and whether they are in force

@@ -90,7 +90,10 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     integrator = integrator_of(setup, main[0].subject)
     add_advice(result, scenes, hard, integrator, in_air)
     if setup.alone and in_air:
-        add_contacts(setup, result)
+        setup.progress("derivatives: contacts")
+        if setup.reading and (rows := contact_rows(setup.reading)):
+            result.tables["contact_derivatives"] = rows
+            result.top.append(result.finding("contacts", rows=rows))
     return result
 
 
@@ -118,7 +121,10 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
     subject, quantity = forward.subject, forward.quantity
     for name, engine in setup.engines.items():
         dynamics = None if engine.unavailable() else engine.of(subject.case)
-        if not (isinstance(dynamics, OutsideDynamics) and has_derivatives(dynamics)):
+        try:
+            if not isinstance(dynamics, OutsideDynamics) or not dynamics.has("derivatives"):
+                continue
+        except EngineError:  # it cannot read the file: the experiment `engines` says why
             continue
         setup.progress(f"derivatives: {LABELS[name]}")
         values = ways.side_by_side(dynamics.derivatives(subject.q, subject.qd, subject.tau))
@@ -132,22 +138,6 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]
         result.times[quantity.name, LABELS[name]] = dynamics.seconds_of_derivatives(*state)
-
-
-def has_derivatives(dynamics: OutsideDynamics) -> bool:
-    """Whether an engine reads the file and has derivatives; the experiment `engines` says why not."""
-    try:
-        return dynamics.has("derivatives")
-    except EngineError:
-        return False
-
-
-def add_contacts(setup: Setup, result: DerivativesResult) -> None:
-    """What differences are worth where a robot of a file stands on its contacts."""
-    setup.progress("derivatives: contacts")
-    if setup.reading and (rows := contact_rows(setup.reading)):
-        result.tables["contact_derivatives"] = rows
-        result.top.append(result.finding("contacts", rows=rows))
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:
