@@ -1,4 +1,4 @@
-"""Forces of a compiled model near a state, linear in its deviation: actuators, springs and dampers, rows of constraints."""
+"""Forces near a state, linear in its deviation: actuators, springs and dampers, rows of constraints."""
 
 from typing import NamedTuple
 
@@ -27,8 +27,8 @@ class Rows(NamedTuple):
 class Forces(NamedTuple):
     """Forces near a state, and their derivatives by its deviation (n of them).
 
-    smooth: d(actuators + springs and dampers), (nv, n). rows: that act at the state. dJf: d(J' f) with constant f, (nv, nv);
-    dR, daref: (k, n).
+    smooth: d(actuators + springs and dampers), (nv, n). rows: that act at the state. dJf: d(J' f) with
+    constant f, (nv, nv); dR, daref: (k, n).
     """
 
     smooth: np.ndarray
@@ -64,7 +64,7 @@ def rows_at(step: Step, state: np.ndarray) -> tuple[np.ndarray, Rows]:
 
 
 def forces_near(step: Step, state: np.ndarray) -> Forces | None:
-    """The forces near a state at rest; None where rows begin or cease within the nudge: the edge of a contact."""
+    """The forces near a state at rest; None where rows begin or cease within the nudge."""
 
     def forward(by: np.ndarray | None) -> np.ndarray:
         """Actuators, springs and dampers; the data are those at the moved state."""

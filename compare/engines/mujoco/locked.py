@@ -15,7 +15,7 @@ Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m
 
 
 def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> mujoco.MjModel:
-    """The model whose bodies and other joints are placed as mj_kinematics places them with the joints locked."""
+    """The model whose bodies and other joints are where mj_kinematics has them with the joints locked."""
     model = compiled(spec)
     data, places = mujoco.MjData(model), joint_places(model)
     data.qpos[:] = model.qpos0

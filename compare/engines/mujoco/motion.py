@@ -1,4 +1,4 @@
-"""What a robot does: motions of a file with everything on, which smaller models of the file repeat; and what they use."""
+"""Motions of a file with everything on, which smaller models of the file repeat; and what they use."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -49,10 +49,10 @@ def data_at(model: mujoco.MjModel, state: Array, whole: mujoco.MjModel) -> mujoc
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion of a whole model, which smaller ones repeat. All elements have names; controls are constant between times.
+    """A motion of a whole model whose elements have names; controls are constant between times.
 
-    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of each
-    actuator, (times, controls of it).
+    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of
+    each actuator, (times, controls of it).
     """
 
     name: str
@@ -160,7 +160,7 @@ class Simulation:
 
 
 def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, float]:
-    """How far two paths are apart at their common times: the largest of each joint that both have, rad or m, and point."""
+    """How far two paths are apart at common times: the largest of each common joint and point, rad or m."""
     steps = max(path.dt, other.dt)
     every, every_other = round(steps / path.dt), round(steps / other.dt)
     q, whole = path.q[::every], other.q[::every_other]
@@ -186,8 +186,7 @@ def apart(paths: Sequence[Path], others: Sequence[Path], points: Iterable[str] =
 
 @dataclass
 class Use:
-    """What motions used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved
-    from its first position, rad or m.
+    """What motions used: pairs of geoms that touched, what acted by kind, how far joints moved.
 
     middle: the mean positions of the joints; of a joint with a quaternion the start.
     """
@@ -235,7 +234,7 @@ def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
 
 
 def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
-    """How far each speed would move each other one, were it locked at a position: (nv, nv) rad or m, moved by locked.
+    """How far each speed would move each other one, were it locked: (nv, nv) rad or m, moved by locked.
 
     Its own movement times its coupling through M, the largest at positions (times, nq).
     """
@@ -251,7 +250,7 @@ def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
 
 
 def stages_of(simulation: Simulation) -> dict[str, float]:
-    """The time of each stage of a step, us, by MuJoCo's own timers: medians, as other programs may interrupt a step."""
+    """The time of each stage of a step, us, by MuJoCo's timers: medians, as a step may be interrupted."""
     durations = np.array([data.timer.duration.copy() for data in simulation.stepped()])
     steps = 1e6 * np.median(np.diff(durations, axis=0), axis=0)
 
@@ -265,7 +264,7 @@ def stages_of(simulation: Simulation) -> dict[str, float]:
 def near(
     model: mujoco.MjModel, positions: Array, touched: set[tuple[str, str]]
 ) -> dict[tuple[str, str], float]:
-    """The pairs of geoms that came near and never touched, nearest first, and their least distances at positions, m."""
+    """The pairs of geoms that came near and never touched, and their least distances, m, nearest first."""
     wide, data = mujoco.MjModel.__copy__(model), mujoco.MjData(model)
     pairs: dict[tuple[str, str], float] = {}
     wide.geom_margin += NEAR

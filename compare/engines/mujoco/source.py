@@ -1,9 +1,9 @@
 """A file, or MJCF text, read once: what it states, and what MuJoCo compiles of it.
 
-Textures and visual meshes are nearly all of a robot's memory (252 MB of one quadruped, 22 kB without), and every copy
-copies them: what is only drawn is left out. No bodies are fused (fusestatic gives wrong inertias up to MuJoCo 3.10) and
-nothing is printed as XML (which has seven digits). A URDF's meshes are found by their packages, and its floating base
-hangs on the world.
+Textures and visual meshes are nearly all of a robot's memory (252 MB of one quadruped, 22 kB without), and
+every copy copies them: what is only drawn is left out. No bodies are fused (fusestatic gives wrong inertias
+up to MuJoCo 3.10) and nothing is printed as XML (which has seven digits). A URDF's meshes are found by their
+packages, and its floating base hangs on the world.
 """
 
 import os
@@ -49,10 +49,11 @@ class ModelError(ValueError):
 class Source:
     """A file (a Path), MJCF text, or a model that was compiled elsewhere, of which a copy is taken.
 
-    origin: the Path or the text; None: compiled elsewhere. floating: whether the base of a URDF gets a free joint.
-    text: what it says. model: without what is only drawn. missing: the files of meshes and height fields that cannot be
-    read: geoms of them are left out. warnings: of MuJoCo's compiler, one line each. bodies, joints: their numbers in the
-    model, in the order of the spec. ModelError, in one line, where MuJoCo makes no model of it.
+    origin: the Path or the text; None: compiled elsewhere. floating: whether the base of a URDF gets a free
+    joint. text: what it says. model: without what is only drawn. missing: the files of meshes and height
+    fields that cannot be read: geoms of them are left out. warnings: of MuJoCo's compiler, one line each.
+    bodies, joints: their numbers in the model, in the order of the spec. ModelError, in one line, where
+    MuJoCo makes no model of it.
     """
 
     def __init__(self, origin: Path | str | mujoco.MjModel, floating: bool = False) -> None:
@@ -137,7 +138,7 @@ class Source:
 
     @property
     def mesh_geoms(self) -> list[tuple[str, list[bool]]]:
-        """Of each body but the world its name, and whether its geoms are meshes, by their class too; of a URDF nothing."""
+        """The name of each body but the world, and whether its geoms are meshes; of a URDF nothing."""
         bodies, mesh = list(self.spec.bodies)[1:] if self.spec else [], mujoco.mjtGeom.mjGEOM_MESH
         return [(body.name, [geom.type == mesh for geom in body.geoms]) for body in bodies]
 
@@ -170,7 +171,7 @@ class Source:
         return other
 
     def without_meshes(self) -> mujoco.MjModel:
-        """The compiled model for what touches nothing: meshes are nearly all of its memory, and every copy copies them."""
+        """The compiled model for what touches nothing: meshes are nearly all of its memory."""
         if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
             return self.model
         model = compiled(self.bare_spec)
@@ -180,8 +181,8 @@ class Source:
     def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
         """The compiled model without the joints named in `positions`, see names.joint_places.
 
-        Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a locked
-        joint; bare: all tendons, equalities and meshes, and all actuators except those with armature.
+        Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a
+        locked joint; bare: all tendons, equalities and meshes, and all actuators except those with armature.
         ModelError if anything else refers to a locked joint, or nothing is stated.
         """
         names = ", ".join(positions)
@@ -213,7 +214,7 @@ def is_urdf(text: str) -> bool:
 
 
 def parsed(origin: Path | str, text: str, floating: bool = False) -> mujoco.MjSpec:
-    """The MjSpec of a file (a Path) with this text, or of the text alone; floating: the base of a URDF is free."""
+    """The MjSpec of a file (a Path) with this text, or of the text; floating: the base of a URDF is free."""
     spec = parsed_file(origin, text) if isinstance(origin, Path) else mujoco.MjSpec.from_string(text)
     if floating and not is_urdf(text):
         raise ValueError("only the base of a URDF is made floating; MJCF states its free joints")
@@ -242,7 +243,7 @@ def parsed_file(path: Path, text: str) -> mujoco.MjSpec:
 
 
 def place_of(address: str, path: Path) -> Path | None:
-    """The file of package://NAME/... in a folder NAME beside a URDF or above it, else beside the URDF; None: neither."""
+    """The file of package://NAME/... in a folder NAME beside a URDF or above it, else beside the URDF."""
     _, _, relative = address.partition("://")
     places = [*(above / relative for above in path.parents), path.parent / Path(relative).name]
     return next((place for place in places if place.is_file()), None)
@@ -255,7 +256,7 @@ def is_read(spec: mujoco.MjSpec, asset: mujoco.MjsMesh | mujoco.MjsHField) -> bo
 
 
 def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
-    """Delete meshes and height fields by their files, and geoms of them. ValueError where one has an inertia."""
+    """Delete meshes and height fields by their files, and geoms. ValueError where one has an inertia."""
     assets = [asset for asset in (*spec.meshes, *spec.hfields) if asset.file in missing and asset.file]
     names = {asset.name: asset.file for asset in assets}
     geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]

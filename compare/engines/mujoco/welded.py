@@ -15,7 +15,7 @@ NO_MASS = "mass and inertia of moving bodies"  # in MuJoCo's message
 
 
 def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
-    """The model of a spec, also where a link without mass, of which MuJoCo makes none, carries others; ValueError as MuJoCo's."""
+    """The model of a spec, also where a link without mass carries others, which MuJoCo refuses."""
     try:
         return spec.compile()
     except ValueError as error:
@@ -36,7 +36,7 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
 
 
 def welded_bodies(model: mujoco.MjModel) -> dict[int, int]:
-    """The bodies with mass that have no joint, and the body with one to which they are fixed, 0: the world, by number.
+    """The bodies with mass and without a joint, and the body to which each is fixed, 0: the world.
 
     Those of negligible mass are among them, fixed to the world.
     """
@@ -60,7 +60,7 @@ def negligible(model: mujoco.MjModel, bodies: np.ndarray) -> list[int]:
 
 
 def join(model: mujoco.MjModel, welded: Mapping[int, int]) -> None:
-    """Give each body the mass, the centre of mass and the inertia of those that are welded to it, which lose theirs."""
+    """Give each body the mass, centre of mass and inertia of those welded to it, which lose theirs."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     fixed = [body for body, base in welded.items() if not base]

@@ -38,8 +38,8 @@ class OwnEquations:
     """
 
     def __init__(
-        self, source: object, coordinates: Coordinates, joints: JointMap | None = None, tree: tmt.Tree | None = None,
-        required: Sequence[str] = ("mass_matrix", "bias"),
+        self, source: object, coordinates: Coordinates, joints: JointMap | None = None,
+        tree: tmt.Tree | None = None, required: Sequence[str] = ("mass_matrix", "bias"),
     ):  # fmt: skip
         self.coordinates, self.tree = coordinates, tree
         self.functions = functions.functions_of(source, coordinates, required)
