@@ -1,9 +1,9 @@
-"""The joints of a user's equations: their order, sense, zero and units compared with those of the model; joints of two files.
+"""The joints of a user's equations: their order, sense, zero and units; joints of two files.
 
-A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg", "knee-0.1rad",
-"slider+0.2m", another zero (own position = position of the model + 90 deg); "knee in deg", positions in deg and speeds
-in deg/s; "knee in deg (rad/s)", positions only; and combinations: "-knee+90deg in deg". Mbar and h are always per rad
-and in N m.
+A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg",
+"knee-0.1rad", "slider+0.2m", another zero (own position = position of the model + 90 deg); "knee in deg",
+positions in deg and speeds in deg/s; "knee in deg (rad/s)", positions only; and combinations: "-knee+90deg in
+deg". Mbar and h are always per rad and in N m.
 """
 
 import re
@@ -47,10 +47,10 @@ class Joint(NamedTuple):
 
 
 class JointMap:
-    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and a user's equations (`own`).
+    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and `own` equations.
 
-    q, v: the index in the model of each own position and speed. The others are factors of own positions (sign, of_q),
-    zeros, and factors of own speeds (sense, of_v).
+    q, v: the index in the model of each own position and speed. The others are factors of own positions
+    (sign, of_q), zeros, and factors of own speeds (sense, of_v).
     """
 
     def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]) -> None:
@@ -75,7 +75,7 @@ class JointMap:
         return bool(in_order and (factors == 1.0).all() and not self.zero.any())
 
     def after(self, first: "JointMap", coordinates: Coordinates) -> "JointMap | None":
-        """The composition: first, then this map. None if it cannot be stated, for example degrees of degrees."""
+        """The composition: first, then this map. None if it cannot be stated, such as degrees of degrees."""
         inner_joints, joints = dict(zip(coordinates.names, first.joints)), []
         for stated in self.joints:
             inner = inner_joints[stated.name]
@@ -171,7 +171,7 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
 # joints of two files
 
 OTHER_TYPE = 1e6  # cost of joints of different kinds, which are never matched
-# cost of a match: 1 - |cos| of the axes, depth in the tree, distance / size of the robot, opposite axis, order (breaks ties)
+# cost of a match: 1 - |cos| of axes, depth, distance / size of the robot, opposite axis, order (breaks ties)
 OF_AXIS, OF_DEPTH, OF_PLACE, OF_SENSE, OF_ORDER = 4.0, 1.5, 1.0, 0.5, 1e-3
 
 
@@ -187,7 +187,7 @@ class Matched(NamedTuple):
 
 
 def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
-    """The joints of a tree for those of the reference, called `whose`: by name, else by place, axis and type. See Unmatched."""
+    """The joints of a tree for those of `whose` reference: by name, else by place, axis and type. Unmatched."""
     from scipy.optimize import linear_sum_assignment  # slow import
 
     pairs = same_names(reference.joint_names, tree.joint_names)

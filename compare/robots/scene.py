@@ -48,8 +48,8 @@ def shorten(text: str, length: int = 60) -> str:
 class Scene:
     """A motion of any robot under constant torque, or under constant controls of its actuators.
 
-    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute values
-    that would hide those of the file. Raises WrongField for values that no robot can have.
+    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute
+    values that would hide those of the file. Raises WrongField for values that no robot can have.
     """
 
     name: str

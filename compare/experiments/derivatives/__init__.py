@@ -62,7 +62,7 @@ def begin(setup: Setup) -> Work:
 
 
 def integrator_of(setup: Setup, subject: Subject) -> str:
-    """The integrator of the robot's model, of which a step's derivatives are advised; implicitfast where it is not compared."""
+    """The model's integrator, for whose steps an eps is advised; implicitfast where it is not compared."""
     model = cast(Mujoco, setup.engines["mujoco"]).model
     compared = [name for name in INTEGRATORS if name in methods_for(subject.tree)]
     same = (name for name in compared if MEMBERS[name] == model.opt.integrator)
@@ -201,7 +201,7 @@ def add_advice(
     result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured], integrator: str,
     in_air: bool,
 ) -> None:  # fmt: skip
-    """Which eps to use, by MuJoCo's own function where it takes the integrator; where that fails. in_air: no contacts."""
+    """Which eps to use, by MuJoCo's function where it takes the integrator; where that fails."""
     by_eps = [row for row in scenes if row.eps]
     step = [row for row in by_eps if row.quantity == ways.step_name(integrator)]
     inverse = [row for row in by_eps if row.quantity == ways.INVERSE]
@@ -236,7 +236,7 @@ def add_advice(
 
 
 def tried(rows: Sequence[DerivativeRow], quantity: str) -> list[DerivativeRow]:
-    """The rows of a quantity by MuJoCo's own function, of steps centred; by differences of mj_step where there is none."""
+    """The rows of a quantity by MuJoCo's function, centred; by differences of mj_step where there is none."""
     same = [row for row in rows if row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)]
     by_function = [row for row in same if not row.way.startswith(ways.BY_STEPS)]
     return by_function or same

@@ -1,4 +1,4 @@
-"""No more model than a motion of a file needs: the answer, its tables, its checks, and the file to take away."""
+"""No more model than a motion of a file needs: the answer, tables, checks, the file to take away."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -151,7 +151,7 @@ def add_checks(
     small: Smaller,
     written: Smaller,
 ) -> float:
-    """What is taken out changes no bit; the written file is within the error; its equations are those of tmt's lock.
+    """What is taken out changes no bit; the written file is within the error and has tmt's locked equations.
 
     How far the written file, with six digits, is from the model in memory, rad or m.
     """
