@@ -19,7 +19,7 @@ from .coordinates import FREE, Coordinates, free_joints
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 NUMBER = r"[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-STATED = re.compile(rf"(?P<name>.+?)(?P<offset>{NUMBER})(?P<measure>deg|rad|m)")
+ZERO, UNIT = rf"(?:(?P<zero>{NUMBER})(?P<measure>deg|rad|m))", "(?: +in (?P<unit>.+))"
 FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
@@ -145,27 +145,23 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
     kinds = dict(zip(coordinates.names, coordinates.all_kinds))
     if text in kinds:
         return Joint(text)
-    units = [unit for unit in PER_UNIT if unit and text.endswith(f" in {unit}")]
-    unit = units[0] if units else ""
-    name, sign, zero = text.removesuffix(f" in {unit}").rstrip(), 1.0, 0.0
-    if name not in kinds and name.startswith("-"):
-        name, sign = name[1:], -1.0
-    if name not in kinds and (match := STATED.fullmatch(name)):
-        name, value, measure = match["name"], float(match["offset"]), match["measure"]
-        zero = float(np.radians(value)) if measure == "deg" else value
-        if name in kinds and (measure == "m") != (kinds[name] == "slide"):
-            raise JointsError(f"joint {text!r}: {name} is a {kinds[name]}, its zero cannot be in {measure}")
-    if name not in kinds:
-        before, _, measure = name.rpartition(" in ")
-        if before.removeprefix("-") in kinds:
-            known = ", ".join(filter(None, PER_UNIT))
-            raise JointsError(f"joint {text!r}: unknown unit {measure!r}; known: {known}")
+    names = "|".join(map(re.escape, sorted(kinds, key=len, reverse=True)))
+    match = re.fullmatch(f"(?P<sign>-?)(?P<name>{names}){ZERO}?{UNIT}?", text)
+    if match is None:
         raise JointsError(f"unknown joint {text!r}; known: {listed(coordinates.names)}, stated as {FORMS}")
-    if kinds[name] == "ball":
+    name, measure, unit = match["name"], match["measure"], match["unit"] or ""
+    kind, zero = kinds[name], float(match["zero"] or 0.0)
+    if unit not in PER_UNIT:
+        known = ", ".join(filter(None, PER_UNIT))
+        raise JointsError(f"joint {text!r}: unknown unit {unit!r}; known: {known}")
+    if measure and (measure == "m") != (kind == "slide"):
+        raise JointsError(f"joint {text!r}: {name} is a {kind}, its zero cannot be in {measure}")
+    if kind == "ball":
         raise JointsError(f"joint {text!r}: {name} is a ball, only its name can be stated")
-    if kinds[name] == "slide" and unit:
+    if kind == "slide" and unit:
         raise JointsError(f"joint {text!r}: {name} is a slide, its unit is m")
-    return Joint(name, sign, zero, unit, kinds[name] == "slide")
+    zero = float(np.radians(zero)) if measure == "deg" else zero
+    return Joint(name, -1.0 if match["sign"] else 1.0, zero, unit, kind == "slide")
 
 
 # joints of two files
