@@ -11,6 +11,7 @@ import re
 import warnings
 from collections.abc import Collection
 from copy import copy
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -62,8 +63,6 @@ class Source:
         self.warnings: tuple[str, ...] = ()
         self.missing: tuple[str, ...] = ()
         self.welded: dict[int, int] = {}
-        self._spec: mujoco.MjSpec | None = None
-        self._bare: mujoco.MjSpec | None = None
         if isinstance(origin, mujoco.MjModel):
             self.model = mujoco.MjModel.__copy__(origin)
         elif isinstance(origin, Path | str):
@@ -84,8 +83,8 @@ class Source:
         try:
             with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                self._spec = parsed(origin, self.text, self.floating)
-                spec = self.compiled_spec(self._spec)
+                self.spec = stated = parsed(origin, self.text, self.floating)
+                spec = self.compiled_spec(stated)
             bytes(self.model.names).decode()
         except UnicodeDecodeError:
             raise ModelError(f"{self} has names that are not UTF-8; save it as UTF-8") from None
@@ -96,7 +95,7 @@ class Source:
             mujoco.mj_setCacheCapacity(cache, capacity)
         lines += [str(warning.message) for warning in caught]
         self.warnings = tuple(dict.fromkeys(" ".join(line.split()) for line in lines))
-        if self._spec.compiler.fusestatic and is_from_geoms(spec):
+        if stated.compiler.fusestatic and is_from_geoms(spec):
             fused = spec.copy()
             fused.compiler.fusestatic = True
             if not np.isclose(moving_mass(compiled(fused)), moving_mass(self.model)):
@@ -134,7 +133,7 @@ class Source:
         return "the model" if self.origin is None else "the text"
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_spec": None, "_bare": None}
+        return {name: value for name, value in self.__dict__.items() if name not in ("spec", "bare")}
 
     @property
     def mesh_geoms(self) -> list[tuple[str, list[bool]]]:
@@ -142,30 +141,30 @@ class Source:
         bodies, mesh = list(self.spec.bodies)[1:] if self.spec else [], mujoco.mjtGeom.mjGEOM_MESH
         return [(body.name, [geom.type == mesh for geom in body.geoms]) for body in bodies]
 
-    @property
+    @cached_property
     def spec(self) -> mujoco.MjSpec | None:
         """What is stated: only copies of it are compiled. None: the model was compiled elsewhere."""
-        if self._spec is None and self.origin is not None:  # in another process
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the first reading has them
-                self._spec = parsed(self.origin, self.text, self.floating)
-                leave_out(self._spec, self.missing)
-        return self._spec
+        if self.origin is None:
+            return None
+        with warnings.catch_warnings():  # in another process
+            warnings.simplefilter("ignore")  # the first reading has them
+            spec = parsed(self.origin, self.text, self.floating)
+            leave_out(spec, self.missing)
+        return spec
 
-    @property
-    def bare_spec(self) -> mujoco.MjSpec:
-        """A copy of what is stated, without what is only drawn, and without meshes, if they have no mass."""
+    @cached_property
+    def bare(self) -> mujoco.MjSpec:
+        """What is stated without what is only drawn, and without meshes, if they have no mass: copies are changed."""
         assert self.spec is not None
-        if self._bare is None:
-            self._bare = without_visuals(self.spec)
-            if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
-                delete_meshes(self._bare)
-        return self._bare.copy()
+        bare = without_visuals(self.spec)
+        if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
+            delete_meshes(bare)
+        return bare
 
     def joined(self) -> "Source":
         """The same, with the mass of bodies that are welded to a moving one in that one."""
         other = copy(self)
-        other._spec = self._spec  # which is not pickled, nor copied
+        other.spec = self.spec  # which is not pickled, nor copied
         other.model, other.welded = mujoco.MjModel.__copy__(self.model), welded_bodies(self.model)
         join(other.model, other.welded)
         return other
@@ -174,7 +173,7 @@ class Source:
         """The compiled model for what touches nothing: meshes are nearly all of its memory."""
         if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
             return self.model
-        model = compiled(self.bare_spec)
+        model = compiled(self.bare.copy())
         join(model, self.welded)
         return model
 
@@ -191,7 +190,7 @@ class Source:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-                spec = self.bare_spec if bare else without_visuals(self.spec)
+                spec = self.bare.copy() if bare else without_visuals(self.spec)
                 model = compiled_without(spec, positions, bare)
         except ValueError as error:
             raise ModelError(f"MuJoCo cannot compile {self} with locked joints {names}: {error}") from None

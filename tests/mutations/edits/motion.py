@@ -66,7 +66,7 @@ EDITS = (
     ("mujoco.smaller", "finished", "data.ctrl", "0.0 * data.ctrl", "a smaller file starts without controls"),
     ("mujoco.locked", "compiled_without", "smaller.jnt_stiffness[_1] = _2", "pass", "a springdamper is chosen anew"),
     ("mujoco.locked", "add_parts", "armature=armature", "armature=0.0", "parts of a free joint lose its armature"),
-    ("source", "Source.bare_spec", "self.spec.compiler.settotalmass > 0.0", "False", "a total mass without meshes"),
+    ("source", "Source.bare", "self.spec.compiler.settotalmass > 0.0", "False", "a total mass without meshes"),
     ("inventory", "usable_keys", "np.hstack(_1)", "m.key_qpos", "a keyframe may have infinite controls"),
     ("inventory", "contact_pairs", "[chosen, _1]", "[chosen]", "pairs that a file names do not touch"),
     ("scene_file", "read_controls", "np.diff(times) > 0.0", "np.diff(times) > -1.0", "times of controls may stand"),
