@@ -83,7 +83,7 @@ def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
 def last_hinge(m: mujoco.MjModel, body: int) -> int:
     """The last hinge that moves a body, by its number, -1: none."""
     mover = m.body_weldid[body]
-    return int(m.body_jntadr[mover] + m.body_jntnum[mover] - 1) if mover else -1
+    return int(m.body_jntadr[mover] + m.body_jntnum[mover] - 1) if m.body_jntnum[mover] else -1
 
 
 Options = Mapping[str, bool]  # of the file, and whether they are in force

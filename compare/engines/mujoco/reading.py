@@ -161,8 +161,8 @@ def tree_with_sites(reading: Reading) -> tmt.Tree:
 
 def carriers(model: mujoco.MjModel, places: Sequence[Place]) -> list[int]:
     """The last joint of the Tree that moves each body, -1: none."""
-    last = {int(model.jnt_bodyid[place.joint]): i for i, place in enumerate(places)} | {0: -1}
-    return [last[body] for body in model.body_weldid.tolist()]
+    last = {int(model.jnt_bodyid[place.joint]): i for i, place in enumerate(places)}
+    return [last.get(body, -1) for body in model.body_weldid.tolist()]
 
 
 def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:

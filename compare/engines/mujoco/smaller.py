@@ -11,12 +11,11 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from .changed import state_as_compiled
-from .locked import Positions, compiled_without, delete_geoms, delete_named
+from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
 from .source import Source, is_from_geoms
 from .variants import of_base
-from .welded import compiled
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",

@@ -20,9 +20,9 @@ import mujoco
 import numpy as np
 
 from ...process.parts import is_pipe, named_by
-from .locked import FROM_GEOMS, Positions, compiled_without, delete_geoms, delete_meshes, gives_inertia
+from . import locked
+from .locked import FROM_GEOMS, Positions, compiled, gives_inertia
 from .names import moving
-from .welded import compiled, join, welded_bodies
 
 # by MuJoCo, of a mesh that is not there or in another format
 UNREAD = ("Error opening file", "no decoder found")
@@ -158,15 +158,15 @@ class Source:
         assert self.spec is not None
         bare = without_visuals(self.spec)
         if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
-            delete_meshes(bare)
+            locked.delete_meshes(bare)
         return bare
 
     def joined(self) -> "Source":
         """The same, with the mass of bodies that are welded to a moving one in that one."""
         other = copy(self)
         other.spec = self.spec  # which is not pickled, nor copied
-        other.model, other.welded = mujoco.MjModel.__copy__(self.model), welded_bodies(self.model)
-        join(other.model, other.welded)
+        other.model, other.welded = mujoco.MjModel.__copy__(self.model), locked.welded_bodies(self.model)
+        locked.join(other.model, other.welded)
         return other
 
     def without_meshes(self) -> mujoco.MjModel:
@@ -174,7 +174,7 @@ class Source:
         if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
             return self.model
         model = compiled(self.bare.copy())
-        join(model, self.welded)
+        locked.join(model, self.welded)
         return model
 
     def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
@@ -191,10 +191,10 @@ class Source:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the compiler's, of the file as it is
                 spec = self.bare.copy() if bare else without_visuals(self.spec)
-                model = compiled_without(spec, positions, bare)
+                model = locked.compiled_without(spec, positions, bare)
         except ValueError as error:
             raise ModelError(f"MuJoCo cannot compile {self} with locked joints {names}: {error}") from None
-        join(model, self.welded)
+        locked.join(model, self.welded)
         return model
 
 
@@ -262,7 +262,7 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
     for geom in filter(gives_inertia, geoms):
         why = f"is that of its mesh {names[geom.meshname or geom.hfieldname]}, which cannot be read"
         raise ValueError(f"the inertia of body {geom.parent.name!r} {why}")
-    delete_geoms(spec, geoms)
+    locked.delete_geoms(spec, geoms)
 
 
 def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
