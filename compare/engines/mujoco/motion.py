@@ -1,7 +1,7 @@
 """Motions of a file with everything on, which smaller models of the file repeat; and what they use."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -184,18 +184,17 @@ def apart(paths: Sequence[Path], others: Sequence[Path], points: Iterable[str] =
     return error if np.isfinite(error) else np.inf
 
 
-@dataclass
-class Use:
+class Use(NamedTuple):
     """What motions used: pairs of geoms that touched, what acted by kind, how far joints moved.
 
     middle: the mean positions of the joints; of a joint with a quaternion the start.
     """
 
-    pairs: set[tuple[str, str]] = field(default_factory=set)
-    acted: dict[str, set[str]] = field(default_factory=dict)
-    has_constraints: bool = False
-    ranges: dict[str, float] = field(default_factory=dict)
-    middle: dict[str, Array] = field(default_factory=dict)
+    pairs: set[tuple[str, str]]
+    acted: dict[str, set[str]]
+    has_constraints: bool
+    ranges: dict[str, float]
+    middle: dict[str, Array]
 
     @property
     def geoms(self) -> set[str]:
@@ -204,28 +203,24 @@ class Use:
 
 def used(simulation: Simulation) -> Use:
     """What the motions of a model use, step by step."""
-    m, use, path, forces = simulation.model, Use(), [], np.zeros(len(simulation.data.actuator_force))
+    m, path, most_rows, forces = simulation.model, [], 0, np.zeros(len(simulation.data.actuator_force))
     pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
     for d in simulation.stepped():
         pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
         acts = (d.efc_force != 0.0) | (d.efc_type != ACTS["equality"][0])
         rows.update(zip(d.efc_type[acts].tolist(), d.efc_id[acts].tolist()))
-        use.has_constraints |= d.nefc > 0
-        forces = np.maximum(forces, np.abs(d.actuator_force))
+        most_rows, forces = max(most_rows, d.nefc), np.maximum(forces, np.abs(d.actuator_force))
         path.append(d.qpos.copy())
-    use.pairs = {pair_of(m, pair) for pair in pairs}
+    acted = {"actuator": {name for name, force in zip(actuators(m), forces) if force}}
     for kind, types in ACTS.items():
-        use.acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
-    numbers = range(number_of_actuators(m))
-    use.acted["actuator"] = {element_name(m, "actuator", number) for number in numbers if forces[number]}
-    q = np.array(path)
-    use.ranges = movements(
-        Path(m, simulation.dt, q, q), Path(m, simulation.dt, np.tile(q[0], (len(q), 1)), q)
-    )
+        acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
+    q, middle = np.array(path), {}
+    still = np.tile(q[0], (len(q), 1))
+    ranges = movements(*(Path(m, simulation.dt, positions, q) for positions in (q, still)))
     for name, (columns, _) in joints(m).items():
         is_number = columns.stop - columns.start == 1
-        use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
-    return use
+        middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
+    return Use({pair_of(m, pair) for pair in pairs}, acted, most_rows > 0, ranges, middle)
 
 
 def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:

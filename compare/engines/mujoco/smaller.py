@@ -31,8 +31,7 @@ class Smaller:
 
     def __init__(self, spec: mujoco.MjSpec) -> None:
         self.spec = spec
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the first reading has them
+        with warnings.catch_warnings(action="ignore"):  # the first reading has them
             self.model = compiled(spec)
 
     @classmethod
@@ -72,8 +71,7 @@ class Smaller:
         spec.comment = comment.replace("--", "- -")  # which XML does not allow
         spec.modelfiledir, spec.meshdir, spec.strippath = str(path.absolute().parent), "", False
         spec.texturedir = str(origin / spec.texturedir) if spec.textures else ""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             compiled(spec)
             path.write_text(spec.to_xml(), encoding="utf-8")
 
@@ -207,8 +205,7 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
     tied = [tendon for tendon in range(model.ntendon) if numbers.intersection(joints_of(model, tendon))]
     gone = {element_name(model, "tendon", tendon) for tendon in tied}
     delete_named(spec, [tendon for tendon in spec.tendons if tendon.name in gone])
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         fixed = compiled_without(spec, of_parts(model, positions), bare=False)
     for tie in list(spec.equalities):
         bodies = [mujoco.mj_name2id(fixed, mujoco.mjtObj.mjOBJ_BODY, name) for name in (tie.name1, tie.name2)]

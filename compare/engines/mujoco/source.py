@@ -81,8 +81,7 @@ class Source:
         capacity = mujoco.mj_getCacheCapacity(cache)
         mujoco.mj_setCacheCapacity(cache, 0)  # it would hold all meshes, in twice the memory of the model
         try:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
+            with warnings.catch_warnings(record=True, action="always") as caught:
                 self.spec = stated = parsed(origin, self.text, self.floating)
                 spec = self.compiled_spec(stated)
             bytes(self.model.names).decode()
@@ -146,8 +145,7 @@ class Source:
         """What is stated: only copies of it are compiled. None: the model was compiled elsewhere."""
         if self.origin is None:
             return None
-        with warnings.catch_warnings():  # in another process
-            warnings.simplefilter("ignore")  # the first reading has them
+        with warnings.catch_warnings(action="ignore"):  # in another process: the first reading has them
             spec = parsed(self.origin, self.text, self.floating)
             leave_out(spec, self.missing)
         return spec
@@ -188,8 +186,7 @@ class Source:
         if self.spec is None:
             raise ModelError(f"cannot lock {names}: the model was changed after it was read")
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the compiler's, of the file as it is
+            with warnings.catch_warnings(action="ignore"):  # the compiler's, of the file as it is
                 spec = self.bare.copy() if bare else without_visuals(self.spec)
                 model = locked.compiled_without(spec, positions, bare)
         except ValueError as error:

@@ -139,14 +139,13 @@ class Step:
 
     def by_control(self, state: np.ndarray, controls: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
         """The derivative of a step by some of the controls, (n, k)."""
-        columns = []
-        for control in controls:
-            ends = []
-            for sign in (1.0, -1.0):
-                self.put(state)
-                self.data.ctrl[control] += sign * nudge
-                ends.append(self.after(self.state()))
-            columns.append((ends[0] - ends[1]) / (2.0 * nudge))
+
+        def pushed(control: int, by: float) -> np.ndarray:
+            self.put(state)
+            self.data.ctrl[control] += by
+            return self.after(self.state())
+
+        columns = [(pushed(k, nudge) - pushed(k, -nudge)) / (2.0 * nudge) for k in controls.tolist()]
         return np.array(columns).reshape(-1, self.size).T
 
     def run(self, state: np.ndarray, steps: int, act: Act = lambda step: None) -> Iterator[mujoco.MjData]:
