@@ -216,7 +216,7 @@ def used(simulation: Simulation) -> Use:
         acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
     q, middle = np.array(path), {}
     still = np.tile(q[0], (len(q), 1))
-    ranges = movements(*(Path(m, simulation.dt, positions, q) for positions in (q, still)))
+    ranges = movements(Path(m, simulation.dt, q, q), Path(m, simulation.dt, still, q))
     for name, (columns, _) in joints(m).items():
         is_number = columns.stop - columns.start == 1
         middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]

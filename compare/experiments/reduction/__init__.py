@@ -79,9 +79,9 @@ def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
         result.tables.setdefault("reduction_needs", []).extend(rows)
         groups.setdefault((names, case.scene.locked, need.stays), []).append(case)
     for numbers, cases in sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2])):
-        about, scenes = claim_values(cases[0].robot), [case.name for case in cases]
-        values = dict(zip(("needed", "locked", "stays"), numbers))
-        result.top.append(result.finding("answer", scenes=scenes, about=about, **values))
+        values: dict[str, Any] = dict(zip(("needed", "locked", "stays"), numbers))
+        values |= {"about": claim_values(cases[0].robot), "scenes": [case.name for case in cases]}
+        result.top.append(result.finding("answer", **values))
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:
