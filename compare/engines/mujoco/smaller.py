@@ -90,9 +90,8 @@ def drawing(small: Smaller, use: Use) -> int:
     """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, meshes."""
     for material in small.spec.materials:
         material.textures = [""] * len(material.textures)
-    return touchless(small, lambda geom: not (geom.contype or geom.conaffinity)) + sum(
-        small.delete(elements, lambda _: True) for elements in DRAWN
-    )
+    count = touchless(small, lambda geom: not (geom.contype or geom.conaffinity))
+    return count + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
 
 
 def touchless(small: Smaller, is_needless: Callable[[mujoco.MjsGeom], bool]) -> int:

@@ -89,13 +89,9 @@ def add(result: Result, setup: Setup, reading: Reading) -> None:
 
 
 def add_tables(
-    result: Result,
-    scene: Scene,
-    locks: Locks,
-    names: list[str],
-    kinds: list[tuple[FreeRow, Smaller]],
+    result: Result, scene: Scene, locks: Locks, names: list[str], kinds: list[tuple[FreeRow, Smaller]],
     small: Smaller,
-) -> None:
+) -> None:  # fmt: skip
     """Stages of a step, what was used, what was taken out and its time, joints, pairs that came near."""
     use = scene.use
     stages = [stages_of(scene.simulation(file)) for file in (scene.whole, locks.free, small)]
@@ -142,14 +138,9 @@ def use_of(scene: Scene) -> list[UseRow]:
 
 
 def add_checks(
-    result: Result,
-    scene: Scene,
-    free: Smaller,
-    locked: Mapping[str, np.ndarray],
-    chosen: Answer,
-    small: Smaller,
-    written: Smaller,
-) -> float:
+    result: Result, scene: Scene, free: Smaller, locked: Mapping[str, np.ndarray], chosen: Answer,
+    small: Smaller, written: Smaller,
+) -> float:  # fmt: skip
     """What is taken out changes no bit; the written file is within the error and has tmt's locked equations.
 
     How far the written file, with six digits, is from the model in memory, rad or m.
