@@ -218,13 +218,9 @@ def whole_run(
 
 
 def start_of(
-    model: mujoco.MjModel,
-    drive: Drive,
-    key: str,
-    push: np.ndarray,
-    q: np.ndarray | None = None,
+    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None,
     controls: Sequence[float | None] = (),
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) added to its speeds.
 
     q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.

@@ -149,15 +149,11 @@ def frontier(
             run, is_own = scene.simulation(small, dt, integrator), (integrator, dt) == own
             paths = run()
             row = FrontierRow(
-                model=name,
-                locked=len(locks.positions(groups)),
-                integrator=integrator,
-                dt=dt,
-                error=scene.apart(paths, reference),
-                error_of_model=error_of_model,
+                model=name, locked=len(locks.positions(groups)), integrator=integrator, dt=dt,
+                error=scene.apart(paths, reference), error_of_model=error_of_model,
                 error_of_step=scene.apart(paths, fine),
                 error_at_own_step=locks.error(groups) if is_own else None,
-            )
+            )  # fmt: skip
             if is_own or row.error <= max(errors):
                 candidates.append(Candidate(row, small, groups))
                 runs.append(run)
