@@ -113,6 +113,14 @@ def test_what_nothing_explains_names_the_entries():
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
+def test_a_robot_of_slides_alone_has_no_sine_that_is_wrong():
+    """A number that nobody writes: causes that are likelier are sought, among them sines."""
+    slides = replace(ARM, kind=("slide",) * 3)
+    M = tmt.mass_matrix(Q, slides) + np.diag([0.1234567891, 0.0, 0.0])
+    found = diagnose(slides, Values.of(slides, Q, QD, M, None))
+    assert "armature of alpha" in {cause.place for cause in found.causes}
+
+
 def test_only_what_is_given_is_compared():
     found = diagnosis(packed(tmt.mass_matrix(Q, HEAVY), np.full_like(Q, np.nan)))
     assert "mass of forearm" in {cause.place for cause in found.causes} and found.compared == 6
