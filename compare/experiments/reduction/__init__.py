@@ -23,6 +23,7 @@ from .sub_blocks import compare_blocks
 EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
+    first_screen=("answer",),
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
 )
 

@@ -44,9 +44,7 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     add_times(setup, scenes)
     result = judged(setup, scenes)
     if settings := conclusions.cheapest_settings(result):
-        values = {"settings": settings, **conclusions.target(result)}
-        result.headline = result.finding("headline", **values)
-        result.top.append(result.finding("answer", **values))
+        result.headline = result.finding("headline", settings=settings, **conclusions.target(result))
     result.tables["what_should_i_use"] = conclusions.advice(result)
     result.find("columns")
     setup.progress("speed: one evaluation")
