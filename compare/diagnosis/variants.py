@@ -217,7 +217,7 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
     places.sort(key=lambda place: OF_FACTORS.index(place.kind))
     columns = [(place.name, place.column) for place in places if place.column is not None]
     multiplied = list(parallel(search, columns))
-    if not hinges or not added and not multiplied:
+    if not hinges or not (added or multiplied):
         return
     functions, pairs = functions_of(equations, hinges)
     changes = np.array([functions[wrong] - functions[right] for wrong, right in pairs])

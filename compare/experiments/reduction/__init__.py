@@ -22,6 +22,7 @@ from .sub_blocks import compare_blocks
 EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
+    first_screen=("answer",),
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
 )
 
@@ -78,10 +79,12 @@ def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
         rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
         result.tables.setdefault("reduction_needs", []).extend(rows)
         groups.setdefault((names, case.scene.locked, need.stays), []).append(case)
-    for numbers, cases in sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2])):
+    for (needed, locked, stays), cases in sorted(
+        groups.items(), key=lambda group: bool(group[0][0] and group[0][2])
+    ):
         about, scenes = claim_values(cases[0].robot), [case.name for case in cases]
-        values = dict(zip(("needed", "locked", "stays"), numbers))
-        result.top.append(result.finding("answer", scenes=scenes, about=about, **values))
+        values = {"scenes": scenes, "needed": needed, "locked": locked, "stays": stays, "about": about}
+        result.top.append(result.finding("answer", **values))
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:

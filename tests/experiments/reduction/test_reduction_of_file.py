@@ -195,13 +195,16 @@ def test_the_written_file_is_moved_with_its_meshes(tmp_path):
     assert "smaller_assets" in say(result.top[0])
 
 
-@pytest.mark.parametrize(
-    "place, message", [("arms.xml", "of the robot itself"), ("none/small.xml", "no such folder")]
-)
-def test_what_cannot_be_written_is_refused_at_once(tmp_path, place, message):
+@pytest.mark.parametrize("option, value, message", [
+    ("--write", "{}/arms.xml", "of the robot itself"), ("--write", "{}/none/small.xml", "no such folder"),
+    ("--write", "{}", "it is a folder"), ("--points", "nothing", "no body and no site 'nothing'"),
+])  # fmt: skip
+def test_what_the_file_does_not_have_or_cannot_be_written_is_refused_at_once(
+    tmp_path, option, value, message
+):
     path = tmp_path / "arms.xml"
     path.write_text(TWO_ARMS)
-    options = request(["reduction", "--mjcf", str(path), "--write", str(tmp_path / place)])
+    options = request(["reduction", "--mjcf", str(path), option, value.format(tmp_path)])
     with pytest.raises(ModelError, match=message):
         compared_with(None, str(path)).request_of(options)
 
