@@ -57,10 +57,10 @@ from tmt.model.tree import Tree
 from tmt.simulation import Motion, simulate
 
 __all__ = [
-    "ARM", "METHODS", "Derivatives", "Frame", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions",
-    "convective_terms", "derivatives", "energy", "equations", "frame", "gravity_balance", "inverse_dynamics",
-    "inverse_dynamics_derivatives", "inverse_mass_matrix", "jacobians", "mass_matrix", "potential_energy", "prepare",
-    "simulate", "spring_torque", "step_derivatives",
+    "ARM", "METHODS", "Derivatives", "Frame", "Motion", "Tree", "acceleration", "angular_velocities", "bias",
+    "com_positions", "convective_terms", "derivatives", "energy", "equations", "frame", "gravity_balance",
+    "inverse_dynamics", "inverse_dynamics_derivatives", "inverse_mass_matrix", "jacobians", "mass_matrix",
+    "potential_energy", "prepare", "simulate", "spring_torque", "step_derivatives",
 ]  # fmt: skip
 
 
@@ -91,7 +91,7 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
 
 
 def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
-    """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
+    """T_b = dx_b/dq, inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
 
     B_b has unit 1. Assignment, parts d and e.
     q (..., nq): positions, rad.
@@ -117,7 +117,7 @@ def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np
 
 
 def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., nv, nv), symmetric positive definite.
+    """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, (..., nv, nv), symmetric positive definite.
 
     Assignment, part e.
     q (..., nq): positions, rad.
@@ -148,7 +148,7 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     It is -Qbar at tau = 0 (assignment, part e) without the joint damping D, and MuJoCo's qfrc_bias.
     q (..., nq), qd (..., nv): positions and speeds, rad and rad/s.
 
-    >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the arm hangs, the elbow turns
+    >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the elbow of a hanging arm
     [0. 0. 0.]
     """
     return _answered("bias", model, q, qd)
@@ -167,7 +167,7 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 
 def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Torque k (q - rest) that holds the springs of the joints, N m, shape (..., nv): of a ball k times the turn from its rest.
+    """Torque k (q - rest) that holds the springs of the joints, N m, (..., nv); of a ball k times the turn.
 
     With `gravity_balance` it is the torque that holds the model at rest.
     q (..., nq): positions, rad.
@@ -193,7 +193,7 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 
 
 def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives accelerations qdd, N m, shape (..., nv).
+    """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives qdd, N m, shape (..., nv).
 
     The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it
     is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
@@ -207,7 +207,7 @@ def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = 
 
 
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
+    """Potential energy V, J, shape (...); 0 with all centres of mass at the origin's height, springs at rest.
 
     q (..., nq): positions, rad.
 

@@ -1,4 +1,4 @@
-"""The dynamics made linear: derivatives of accelerations, torques and steps, and frames with their Jacobians."""
+"""The dynamics made linear: derivatives of accelerations, torques and steps; frames with their Jacobians."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Derivatives(NamedTuple):
 
 
 def derivatives(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> Derivatives:
-    """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd, each (..., nv, nv).
+    """Exact derivatives of `acceleration` by q, qd, tau, of `inverse_dynamics` by q, qd, each (..., nv, nv).
 
     Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by
     qd; dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by
@@ -61,7 +61,7 @@ def inverse_dynamics_derivatives(
 def step_derivatives(
     q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, method: str = "rk4", model: Tree = ARM
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Exact derivatives A = dx+/dx (..., 2 nv, 2 nv) and B = dx+/dtau (..., 2 nv, nv) of one step, x = (movement, qd).
+    """Exact A = dx+/dx (..., 2 nv, 2 nv) and B = dx+/dtau (..., 2 nv, nv) of one step, x = (movement, qd).
 
     The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it
     from the q that it reaches. Of an adaptive method the step is one of its own, of that size.
@@ -92,7 +92,7 @@ class Frame(NamedTuple):
 
 
 def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = ARM) -> Frame:
-    """Pose of a site or body, its Jacobian J (..., 6, nv) and J' qd = dJ/dt qd (..., 6), all in the inertial frame.
+    """Pose of a site or body, its Jacobian J (..., 6, nv), J' qd = dJ/dt qd (..., 6), in the inertial frame.
 
     J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac,
     jacp above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd).
@@ -103,7 +103,7 @@ def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = AR
     >>> tool = dataclasses.replace(
     ...     tmt.ARM, site_names=["tool"], site_joint=[2], site_offset=[(0.3, 0.0, 0.0)]
     ... )
-    >>> print(tmt.frame("tool", [0.0, 0.0, 0.0], [0.0, 0.0, 2.0], tool).convective[:3] + 0.0)  # 0.3 m (2 rad/s)^2
+    >>> print(tmt.frame("tool", [0.0] * 3, [0.0, 0.0, 2.0], tool).convective[:3] + 0.0)  # 0.3 m (2 rad/s)^2
     [-1.2  0.   0. ]
     """
     checked_model(model)

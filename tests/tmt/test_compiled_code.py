@@ -142,8 +142,8 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
 @pytest.mark.parametrize("name, tree", LARGER)
 def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch):
     """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
-    for module, field in ((forms, "DENSE"), (runs, "INLINED")):
-        monkeypatch.setattr(module, field, 0)
+    monkeypatch.setattr(forms, "DENSE", 0)
+    monkeypatch.setattr(runs, "INLINED", 0)
     monkeypatch.setattr(forms, "FORMS", forms.FORMS[1:2])
     monkeypatch.setattr(straight, "LONGEST", 50)
     q, qd, tau = starts(9)

@@ -41,7 +41,7 @@ typedef typename union unsigned using virtual void volatile while main arrays si
 permute reshape assert error math numpy sympy"""
 CONVENTIONS = """\
 M(q) qdd + h(q, qd) = tau - D qd - k (q - rest) - P q - S qd, by the TMT method; Mbar is M, with armature.
-h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs of the joints,
+h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs,
 P and S: gains of a linear controller. Numbers of the model that are no arguments are in the functions.
 T_b, B_b: Jacobians of the centre of mass of body b, inertial frame, and of its angular velocity, body axes.
 SI units, angles in rad. Shapes are those of one state; ... stands for any batch, where there is one."""
@@ -165,7 +165,6 @@ def conventions(model: Tree) -> list[str]:
 
 
 def places(part: slice) -> str:
-    """The first and the last number of a part of q or qd."""
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
 
 
