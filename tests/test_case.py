@@ -34,14 +34,6 @@ def test_a_wrong_field_is_named(field, value, more):
     assert error.field == field and "\n" not in str(error)
 
 
-def test_torques_act_on_the_free_joints():
-    case = ARM.case("pushed", posture="bent", torque=(1.0, 0.5, -1.0), locked=("beta",))
-    assert case.joints == ("alpha", "gamma") and case.tau.tolist() == [1.0, -1.0]
-    assert np.allclose(case.q, np.radians([30, 60])) and case.locked == {"beta": np.radians(20.0)}
-    held = ARM.case("held", posture="bent", torque="hold", locked=("beta",))
-    assert np.allclose(tmt.acceleration(*held.start, held.tau, held.tree), 0.0, atol=1e-12) and held.tau.any()
-
-
 def test_another_robot_has_its_own_joints_and_its_postures_in_degrees():
     two = Robot("two", Path("none.xml"), tmt.ARM.lock({"alpha": 0.0}), {"low": (0, 90)}, ())
     for field, value in (("posture", "high"), ("torque", (1, 2, 3)), ("locked", ("beta", "gamma"))):

@@ -11,7 +11,6 @@ import numpy as np
 import own_equations
 import pytest
 from in_process import InProcess, answered
-from models import PATHS
 from small_runs import Lines
 
 from compare.core.text import say
@@ -61,14 +60,6 @@ def test_right_equations_agree_in_whatever_form(folder, asked, joints):
     assert ("energy above the zero position's" in quantities) == ("energy" in run.robot.own)
 
 
-def test_the_tree_of_another_robot_agrees(folder):
-    text = "from models import PATHS\nfrom compare.engines.mujoco import read\n"
-    (folder / "trees.py").write_text(f"{text}tree = read(PATHS['pendulum_ball']).tree\n")
-    run = examined(folder, "trees.py:tree", ["kinematics", *STATIC], PATHS["pendulum_ball"])
-    assert not run.failed
-    assert {row.quantity for row in run.sections[0].result.rows} == {"x_b", "T_b", "B_b"}
-
-
 @pytest.mark.parametrize("asked, names, where, quantity", [
     ("sign", STATIC, "acceleration", "bias"), ("doubled", STATIC, "gravity", "yours: gravity - bias at rest"),
     ("nan", ["diagnosis"], "diagnosis", "bias returns valid values"),
@@ -95,13 +86,6 @@ def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
         run = examined(folder, f"mine.py:{reference}", ["acceleration", "diagnosis"])
         assert run.causes[0].place == place
         assert {check.experiment for check in run.failed} == {"acceleration", "diagnosis"}
-
-
-def test_trajectories_are_those_of_rk4(folder):
-    run = examined(folder, "mine.py:Object", ["trajectory"])
-    assert run.sections[0].result.checks and not run.failed
-    found = {(row.engine_integrator, row.level) for row in run.sections[0].result.rows}
-    assert found == {("RK4", level) for level in ("one step", "open loop")}
 
 
 def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):
@@ -136,16 +120,6 @@ def test_what_nothing_explains_is_drawn_along_the_coordinate_that_tells_most(fol
     assert (curve.entry, curve.coordinate) == ("h[hip]", "knee") and not run.causes
     assert np.ptp(curve.yours - curve.right) == pytest.approx(2.0, rel=0.03)
     assert [name for name, _ in section.figures] == ["diagnosis_curve"]
-
-
-@pytest.mark.parametrize("asked, joints, right", [
-    ("mine.py:", "knee,hip", "hip,knee"), ("mine.py:swapped", None, "knee,hip"),
-    ("mine.py:swapped", "-knee,hip", "knee,hip"),
-])  # fmt: skip
-def test_the_right_joints_are_named_in_place_of_the_stated_ones(folder, asked, joints, right):
-    run = examined(folder, asked, ["diagnosis"], joints=joints)
-    mirrored = "-" + right.replace(",", ",-")  # the mirror image of the pendulum is the same
-    assert any(f"--joints={one})" in cause.text for cause in run.causes for one in (right, mirrored))
 
 
 def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, folder, capsys):

@@ -80,11 +80,6 @@ def test_three_slides_and_a_ball_in_one_place_are_free_and_float(before, shift, 
     assert (free_joints(tree), floats(tree)) == (free, floating)
 
 
-def test_a_free_body_is_thrown_up_and_tumbles():
-    scenes = {scene.name: scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes}
-    assert scenes["qpos0, thrown"].speed == (0.0, 0.0, 2.0, 120.0, 60.0, -90.0)
-
-
 def test_what_rests_where_it_is_let_go_is_set_going():
     still = replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
     names = [scene.name for scene in robot_of(file_of(still), "my.xml").scenes]
@@ -109,13 +104,6 @@ def test_methods_are_compared_with_servos_that_8192_steps_follow(share, passes):
     kp = share * INERTIA * (8192 / SERVOS_ACT) ** 2
     scenes = {scene.name: scene.tags for scene in robot_of(read(hinge(kp)), "servo.xml").scenes}
     assert ("speed" in scenes["qpos0, step of the servos"]) is passes
-
-
-def test_added_damping_lets_every_joint_decay_at_one_rate():
-    inverse = np.array([[4.0, 1.0], [1.0, 0.25]])
-    for accelerations, rate in (([0.0, 0.0], 2.0), ([1.0, -1.0], 2.0), ([4.0, -16.0], 8.0)):
-        damping = file.added_damping(inverse, np.array(accelerations))
-        np.testing.assert_allclose(np.diag(inverse) * damping, rate)
 
 
 def test_steps_are_four_of_the_files_own_and_no_longer_than_the_fastest_rate():

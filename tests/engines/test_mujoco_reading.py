@@ -184,13 +184,6 @@ def test_what_has_no_name_is_called_by_its_kind_and_number_but_not_as_another():
     assert read(text).tree.joint_names[1] == "joint 0"
 
 
-@pytest.mark.parametrize("name", ["base x", "base turn", "track", "joint 2", "tail", "leg pitch"])
-def test_a_joint_alone_and_left_alone(name, rng):
-    reading = read(PATHS["mixed"])
-    assert_locked(reading, [name], rng)
-    assert_locked(reading, [other for other in reading.tree.joint_names if other != name], rng)
-
-
 @pytest.mark.parametrize("parts", [["x", "z"], ["y", "turn"], ["x", "y", "z"], ["x", "y", "z", "turn"]])
 def test_parts_of_a_free_joint_and_others(parts, rng):
     heavy = '<joint name="base" type="free" armature="0.1"/>'
@@ -254,13 +247,6 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes_something(op
     assert {row.quantity for row in rows.values() if row.why == name} == quantities
     for row in rows.values():
         assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
-
-
-def test_the_mass_of_geoms_is_stated_where_each_has_one():
-    heavy = PLAIN.replace('name="g"', 'name="g" mass="2"')
-    row = rows_of(mjcf(heavy))["b", "mass"]
-    assert (row.stated, row.compiled, row.why) == (2.0, 2.0, "")
-    assert rows_of(mjcf())["b", "mass"].stated is None
 
 
 def test_a_tensor_may_be_off_by_rounding_of_the_sum_of_its_moments():

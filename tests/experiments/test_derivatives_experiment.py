@@ -10,10 +10,9 @@ import tmt
 from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
-from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
-from compare.experiments.derivatives import add_advice, begin, contact_rows, of_mujoco, subjects, ways
+from compare.experiments.derivatives import add_advice, contact_rows, of_mujoco, subjects, ways
 from compare.experiments.derivatives.figures_derivatives import draw_errors
-from compare.experiments.derivatives.ways import CostRow, DerivativeRow, best_of, worst_of_each_eps
+from compare.experiments.derivatives.ways import CostRow, DerivativeRow, worst_of_each_eps
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 
@@ -83,28 +82,6 @@ def test_the_eps_is_that_of_mujocos_own_function_and_of_the_files_integrator(int
     )
     drawn = worst_of_each_eps(line for line in result.drawn if line.way == f"{way}, centred")
     assert min(drawn, key=lambda size: drawn[size].size) == eps  # as the figure has it
-
-
-@pytest.mark.parametrize("integrator", ["Euler", "implicit", "RK4"])
-def test_all_scenes_have_the_files_integrator(integrator):
-    xml = FREE_WITH_HINGE.replace("<mujoco>", f'<mujoco><option integrator="{integrator}"/>')
-    setup = setup_of_file(xml)
-    tasks: list[ways.Task] = []
-    begin(dataclasses.replace(setup, map=lambda _, given: tasks.extend(given)))
-    assert {task.subject.kind for task in tasks} == {"scene", "stiff", "singular"}
-    assert all(integrator in task.integrators for task in tasks)
-
-
-def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
-    """mjd_transitionFD is, where the way is the same, what differences of mj_step are."""
-    dynamics, state = mujoco.of(bent.case), (bent.q[0], bent.qd[0], bent.tau[0])
-    for centred in (False, True):
-        functions = of_transition, of_steps
-        own, steps = (f(dynamics, *state, DT, "implicitfast", 1e-6, centred)() for f in functions)
-        assert np.abs(own - steps[:, :6]).max() < 1e-8
-    inverse = of_inverse(dynamics, *state[:2], np.ones(3), 1e-7)()
-    truth = np.hstack(ways.tmt.inverse_dynamics_derivatives(*state[:2], np.ones(3), bent.tree))
-    assert np.abs(inverse - truth).max() < 1e-4 < np.abs(truth[:, :3] - truth[:, :3].T).max()
 
 
 def test_a_wrong_damper_is_seen_in_the_centred_differences(mujoco, bent):
@@ -191,18 +168,6 @@ def test_tmt_is_compared_with_mujocos_own_centred_function():
     ways_to_it = "mjd, one-sided", "differences, centred", "mjd, centred", ways.COMPILED
     costs = [CostRow(quantity="A", way=way, best_eps=None, error=0.0, time=1.0) for way in ways_to_it]
     assert of_mujoco(costs, "A") is costs[2] and of_mujoco(costs, "B") is None
-
-
-def test_where_differences_lose_digits_is_said(bent):
-    about = {"quantity": "A and B, RK4", "way": "a", "eps": 1e-5, "states": 1, "largest": 1.0}
-    about["unit"] = "rad per rad"
-    rows = [DerivativeRow(subject="stiff servos", error=error, **about) for error in (1e-7, 9e-9, None, 1e-9)]
-    pairs = [{"row": row, "scenes": rows[3]} for row in rows[:3]]
-    said = [say(Finding("derivatives", "hard", {"pairs": [pair]})) for pair in pairs]
-    assert "lose digits: stiff servos: 1e-07 with eps 1e-05 (A and B, RK4, rad per rad" in said[0]
-    assert "the same eps serves" in said[1] and "not finite" in said[2]
-    finer = dataclasses.replace(rows[0], eps=1e-6)
-    assert worst_of_each_eps(rows) == {1e-5: rows[2]} and best_of([*rows, finer]) is finer
 
 
 def test_hard_states_are_those_of_critical_dampers_and_of_the_least_definite_matrix(bent):

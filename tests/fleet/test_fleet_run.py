@@ -1,11 +1,8 @@
 """A fleet is run in the process of the test: rows, reports, what is computed again, and what becomes of files that break."""
 
-import json
 import os
-import pickle
 from concurrent.futures import Future
 from contextlib import chdir
-from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 
@@ -17,7 +14,7 @@ from compare.fleet.cache import locked, write_whole
 from compare.fleet.command import solution_files
 from compare.fleet.executors import Outcome
 from compare.fleet.models import found_models, place_of_report
-from compare.fleet.run import AHEAD, Run
+from compare.fleet.run import Run
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED, FileRow
 from compare.fleet.task import Compared, FleetOptions
 
@@ -117,26 +114,6 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
         assert len(found.executor.calls) == computed
 
 
-class Touch:
-    """What a pickle of it runs."""
-
-    def __reduce__(self):
-        return Path.touch, (Path("ran"),)
-
-
-def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(fleet, tmp_path):
-    fleet(ONE, answer=agrees)
-    mark = report(tmp_path, "a.xml") / ".fleet"
-    key, row = json.loads(mark.read_text())
-    assert fleet({}, answer=agrees).executor.calls == []
-    wrong = {"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1}
-    poisons = [json.dumps((key, other)).encode() for other in ([row], *(row | more for more in wrong))]
-    for poison in (*poisons, pickle.dumps((key, Touch()))):
-        mark.write_bytes(poison)
-        assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"], poison
-    assert not Path("ran").exists()
-
-
 def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):
     whole, of_parts = PENDULUM.format(0.1), "<mujoco><include file='part.xml'/></mujoco>"
     same = {"a.xml": whole, "b.xml": whole, "c.mjcf": whole}  # MuJoCo reads a file by the end of its name
@@ -156,11 +133,6 @@ def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(flee
     assert row.verdict == BROKE and "SIGKILL" in row.reason and not row.has_report and not found.of.is_good
     assert (report(tmp_path, "a.xml") / "index.html").read_bytes() == b"all"
     assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"]
-
-
-def test_few_models_are_in_memory_at_a_time(fleet):
-    found = fleet({f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(20)}, answer=agrees)
-    assert found.executor.most == AHEAD * Inside.workers and len(found.rows) == 20
 
 
 def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_matched(fleet, tmp_path):

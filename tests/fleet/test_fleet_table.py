@@ -2,14 +2,11 @@
 
 import csv
 import dataclasses
-import html
 import json
-import random
 import re
 import shutil
 from functools import partial
 from types import SimpleNamespace
-from urllib.parse import unquote
 
 import pytest
 import runs
@@ -73,12 +70,6 @@ def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, n
     assert row.verdict == verdict and named in row.reason and bool(named) == bool(row.reason)
 
 
-def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
-    assert judged(good(0.2), good(3.0), OWN).worst_ratio == 3.0
-    diverged = judged(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
-    assert (diverged.verdict, diverged.worst_ratio) == (DIFFER, 0.2)
-
-
 def limit(dt, stable, integrator="Euler", kind="finite"):
     of_file = {"file_integrator": "Euler", "stable_at_file_dt": stable}
     return SimpleNamespace(integrator=integrator, limit=kind, predicted_dt=dt, **of_file)
@@ -100,19 +91,6 @@ def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stab
         assert row.stable_at_file_dt is (is_stable and stable is not False)
 
 
-def test_what_needs_a_look_comes_first():
-    right = [
-        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (NOT_JUDGED, None, 0.5, "a"),
-        (UNCONFIRMED, None, 0.5, "a"),
-        (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
-        (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
-    ]  # fmt: skip
-    fields = "verdict", "stable_at_file_dt", "worst_ratio", "file"
-    rows = [row(**dict(zip(fields, values))) for values in right]
-    for seed in range(20):
-        assert sorted(random.Random(seed).sample(rows, len(rows)), key=lambda row: row.order) == rows
-
-
 @pytest.mark.parametrize("before, now, named", [
     ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
     ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ"]),
@@ -132,18 +110,6 @@ def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named,
 def page_of(rows, **more):
     given = {"summary": [], "left_out": (), "changed": None, "origin": {}, "most_points": None}
     return table.fleet_page(rows=rows, **given | more)
-
-
-def test_every_name_leads_to_its_report():
-    names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
-             "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
-    text = page_of([row(file=name) for name in names])
-    links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
-    assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
-    for (address, _), name in zip(links, names, strict=True):
-        address = html.unescape(address)
-        assert not set(address) & set("#?\"'<> ") and ":" not in address  # no fragment, no scheme
-        assert unquote(address) == f"{place_of_report(name)}/index.html"
 
 
 def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():

@@ -129,18 +129,6 @@ def test_an_exchange_that_has_begun_is_finished_and_the_run_ends_well(tmp_path, 
     assert files(tmp_path) == NEW and names_in(tmp_path) == {"report.md", "results.json", "tables"}
 
 
-def test_two_runs_at_once_both_end_well(tmp_path):
-    with new_report(tmp_path / "out") as first:
-        fill(first, "first")
-        with new_report(tmp_path / "out") as second:
-            fill(second, "second")
-            assert first.exists()  # the folder of a run that is alive stays
-        assert files(tmp_path / "out")["results.json"] == "second"
-        assert first.exists()
-    assert files(tmp_path / "out") == {"tables/mass.csv": "first", "results.json": "first"}
-    assert names_in(tmp_path / "out") == {"results.json", "tables"}
-
-
 def test_only_what_a_run_has_left_is_cleared(tmp_path):
     names = ".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md"
     left, *kept = (tmp_path / name for name in names)

@@ -51,9 +51,6 @@ HAND = f"""<mujoco><option integrator="implicitfast"/><worldbody><body><joint na
 <position name="thumb" tendon="thumb" kp="5"/></actuator></mujoco>"""
 TUMBLES = """<mujoco><worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 0 0.3" euler="20 30 0"><freejoint/>
 <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
-# it sinks a little to its rest: a box on a plate with a spring
-STANDS = """<mujoco><worldbody><body pos="0 0 1"><joint name="{0}" type="slide" axis="0 0 1" stiffness="{1}" damping="100"/>
-<geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody></mujoco>"""
 
 
 def setup_for(xml, **request):
@@ -225,14 +222,6 @@ def test_a_body_that_is_moved_from_outside_is_where_the_keyframe_has_it(tmp_path
     assert model.njnt == 1
 
 
-def test_what_the_scene_used_is_a_table(two_arms):
-    use = {row.part: row for row in two_arms[0].tables["reduction_use"]}
-    assert (use["actuators"].in_file, use["actuators"].used) == (5, 2)
-    assert (use["joints that move"].in_file, use["joints that move"].used) == (4, 2)
-    assert (use["geoms that touch"].in_file, use["geoms that touch"].used) == (6, 0)
-    assert use["sensors"].in_file == 1
-
-
 def test_each_kind_is_taken_out_of_what_the_kinds_before_it_have_left(two_arms):
     rows = two_arms[0].tables["reduction_free"]
     assert [row.before for row in rows[1:]] == [row.after for row in rows[:-1]]
@@ -280,14 +269,6 @@ def test_a_file_beyond_the_error_fails(two_arms):
         assert verdicts["motion without what is not used"] is passed
 
 
-@pytest.mark.parametrize("stiffness, name, moves", [(1000.0, "qpos0, at rest", False), (20.0, "qpos0", True)])
-def test_a_robot_that_stands_starts_at_its_rest(stiffness, name, moves):
-    """It sinks by 10 mm, or by half a meter: that is what it does."""
-    stands = scene(STANDS.format("plate", stiffness))
-    assert stands.name == name
-    assert (stands.use.ranges["plate"] > of_file.STILL) is moves
-
-
 def test_the_joints_that_a_tendon_ties_are_locked_together():
     """A hand whose thumb is still; the tendon and its servo go with it."""
     hand = scene(HAND, controls=waves("index"))
@@ -309,18 +290,6 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
     )
     steps = [row for row in result.tables["reduction_frontier"] if row.error_of_step != row.error]
     assert steps and all(row.locked for row in steps)  # of the others the whole error is that of the step
-
-
-def test_errors_of_the_model_and_of_the_step_are_no_parts_of_the_whole(two_arms):
-    """They may cancel each other."""
-    (top, *_), path = two_arms[0].top, two_arms[1]
-    facts = top.values["facts"]
-    row = replace(facts["chosen"].row, error=4e-3, error_of_model=6e-3, error_of_step=2e-3)
-    told = say(
-        replace(top, values={"facts": facts | {"chosen": facts["chosen"]._replace(allowed=1e-2, row=row)}})
-    )
-    assert "error 4 mrad (of the model alone 6 mrad, of the step alone 2 mrad)" in told
-    assert "of that" not in told + path.read_text(encoding="utf-8")
 
 
 def test_after_a_joint_that_costs_too_much_others_are_tried():
@@ -372,64 +341,10 @@ def test_no_answer_is_a_step_that_is_unstable_at_rest():
     assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
 
 
-def test_bodies_that_the_file_fuses_are_fused_in_the_smaller_one_too():
-    """As those of a URDF: the whole file has one body less than is read of it."""
-    tool = '<body pos="0 0 -0.1"><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.2 0.3"/><geom size="0.01"/></body>'
-    fused = TWO_ARMS.replace("<mujoco>", '<mujoco><compiler fusestatic="true"/>').replace(
-        '<site name="left', tool + '<site name="left'
-    )
-    result = answered(fused, controls=waves("left upper"))
-    assert [str(check) for check in result.checks if not check.passed] == []
-    assert {row.joint for row in result.tables["reduction_joints"] if row.locked} >= {
-        "right upper",
-        "right lower",
-    }
-
-
-def many_legs(rng):
-    """A free trunk with 24 legs."""
-    legs = "".join(
-        f"""<body pos="{numbers(rng, 0.1)}"><joint name="leg {leg}" axis="{numbers(rng, 1.0)}"/>
-        <inertial pos="{numbers(rng, 0.05)}" mass="0.5" diaginertia="1e-3 1.2e-3 1.9e-3" quat="{numbers(rng, 1.0, 4)}"/></body>"""
-        for leg in range(24)
-    )
-    trunk = '<freejoint name="base"/><inertial pos="0.01 0 0" mass="5" diaginertia="0.1 0.12 0.2" quat="1 2 3 4"/>'
-    return f"<mujoco><worldbody><body>{trunk}{legs}</body></worldbody></mujoco>"
-
-
-def numbers(rng, size, count=3):
-    return " ".join(map(str, size * rng.normal(size=count)))
-
-
-def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
-    """An error of 1e-11 is still seen."""
-    rng = np.random.default_rng(1)
-    whole = Smaller.whole(Source(many_legs(rng)))
-    legs = {f"leg {leg}": rng.uniform(-2.0, 2.0, 1) for leg in range(24)}
-    small = search.locked(whole, legs)
-    assert small.model.nbody == 2
-    locked = read(whole.model).tree.lock({name: float(q[0]) for name, q in legs.items()})
-    smaller = read(small.model).tree
-    heavier = replace(smaller, mass=tuple((1.0 + 1e-11) * mass for mass in smaller.mass))
-    for other, passed in ((smaller, True), (heavier, False)):
-        result = ReductionResult("reduction")
-        of_file.compare_locked(result, "legs locked", locked, other)
-        assert all(check.passed for check in result.checks) is passed
-
-
 def test_a_file_whose_own_run_fails_is_not_judged():
     result = answered(DAMPED.format(0.02, 1.0))
     (check,) = result.checks
     assert not check.passed and "own run fails" in str(check)
-
-
-def test_a_run_that_fails_is_infinitely_far(two_arms):
-    """From the time on where it fails; of two motions, one."""
-    arms = scene(TWO_ARMS, controls=waves("left upper"))
-    paths, others = arms.run(arms.whole), arms.run(arms.whole)
-    assert arms.apart(paths, others) == 0.0
-    others[0].q[-1, 3] = np.nan
-    assert arms.apart(paths, others) == arms.apart(2 * paths, paths + others) == np.inf
 
 
 def row(gain, error, locked=0, own=None) -> FrontierRow:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
+from trajectory_curves import CASES, FREE, HELD, run_of
 
 import tmt
 from compare.core.check import Result
@@ -13,7 +13,7 @@ from compare.engines.mujoco import parse
 from compare.experiments.followed import Deviation
 from compare.experiments.trajectory import errors, runs
 from compare.experiments.trajectory.runs import Path, TrajectoryResult
-from compare.judge.run import required_time, widest_judged
+from compare.judge.run import widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
 from compare.truth.reference import reference
@@ -89,11 +89,6 @@ def test_a_row_has_the_largest_movement_beside_the_worst_component():
     assert (row.largest_difference, row.worst_difference) == (0.7, 3.0)
 
 
-def test_what_a_scene_asks_for_depends_on_the_scheme_and_the_step():
-    assert required_time(FREE, "rk4", 5 / 64) == 5.0 and required_time(HELD, "rk4", 5 / 64) == 2.5
-    assert [required_time(FREE, "implicit", dt) for dt in (0.0099, 0.0101)] == [5.0, 0.3]
-
-
 @pytest.mark.parametrize("ours, theirs, width, found", [
     (None, None, NARROW, []), (0.5, 0.5, NARROW, [True]), (0.5, 0.51, NARROW, [False]),
     (None, 0.5, NARROW, [False]), (0.5, None, NARROW + 2e-6, []), (0.1, 0.11, AT_ONCE, [False]),
@@ -132,14 +127,6 @@ def test_the_drift_of_energy_falls_at_least_at_the_order(engine, label, order, p
     assert passed == {"x, TMT, 1 s": True, "x, MuJoCo, 1 s": True} | {f"x, {label}, 1 s": passes}
 
 
-def test_no_order_is_measured_where_both_engines_drift_by_rounding_alone():
-    inside, outside = (share * errors.rounding(FREE) for share in (0.999, 1.001))
-    for drift, count in ((inside, 0), (outside, 2)):
-        result = Result("trajectory")
-        errors.check_order(result, FREE, "x", 1, {"tmt": [inside, inside], "mujoco": [2 * drift, drift]})
-        assert len(result.checks) == count
-
-
 def with_gravity(gravity) -> dict:
     return {"mujoco": parse(ARM.mjcf.read_text().replace("0 0 -9.81", gravity), tmt.ARM)}
 
@@ -153,28 +140,3 @@ def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_no
     assert {row.scene for row in result.tables["energy"]} == {"bent, free"} and len(drifts) == 6
     assert drifts["RK4", "mujoco"] == 0.0 < drifts["RK4", "tmt"]
     assert not any(check.passed for check in result.checks if ", MuJoCo" in check.scene)
-
-
-@pytest.mark.parametrize("ended", [None, 1.0])
-def test_the_drift_of_the_energy_is_told_of_the_coarsest_step_where_a_file_is_free_and_undamped(
-    ended, engines
-):
-    free, damped = (replace(case, scene=replace(case.scene, tags=("own",))) for case in (FREE, DAMPED))
-    run = run_of(free, theirs=0.1, ended=(None, ended))
-    # the last is the arm's
-    others = run_of(free, steps=128), run_of(damped), run_of(CASES["zero, free"])
-    result = TrajectoryResult("trajectory", runs=[run, *others])
-    result.tables["energy"] = []
-    errors.find_energy(result, engines["mujoco"])
-    (row,) = result.tables["energy"]
-    energy = tmt.energy(run.paths["mujoco"].q, run.paths["mujoco"].v)
-    drift = None if ended else pytest.approx(np.abs(energy - energy[0]).max())
-    assert (row.scene, row.dt, row.drift) == (free.name, 5.0 / 64, drift) and len(result.top) == 1
-
-
-def test_departures_are_told_of_each_engine():
-    result = TrajectoryResult("trajectory", runs=[run_of(HELD, 0.0, 2.0, left=(None, 0.1))])
-    errors.find_departures(result, ARM)
-    (held,) = result.notes
-    told = [(engine["left"], engine["farthest"]) for engine in held.values["engines"]]
-    assert told == [(None, 0.0), (0.1, pytest.approx(2.0))]
