@@ -75,7 +75,6 @@ class Search:
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
-        self.is_finished = True
 
     def within(self, entries: ndarray) -> "Search":
         """The search of what explains some entries (entries,), whatever the others are."""

@@ -131,6 +131,7 @@ class Equations:
         self.in_M, self.in_h = self.layout.in_M, self.layout.in_h
         self.coordinates = Coordinates(tree.joint_names, tree.kind)
         self.speeds = self.coordinates.speeds
+        self.joints = dict(zip(tree.joint_names, tree.coordinates.joints))
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
 
     @cached_property

@@ -153,9 +153,8 @@ class Recursion:
         axes = [step("axis", i, rotated(carrier, axis), axis.copy) for axis in local]
         spin = np.einsum("ksc,sk->sc", axes, rates)
         to_parent = backward(parent.turn)
-        passed = step(
-            "carried back", i, parent.passed, lambda: rotated(turn @ own @ to_parent, parent.passed)
-        )
+        passed = parent.passed
+        passed = step("carried back", i, passed, lambda: rotated(turn @ own @ to_parent, parent.passed))
         passed = step("carried as it is", i, passed, lambda: rotated(turn @ to_parent, passed))
         alpha = parent.alpha + step("alpha", i, np.cross(passed, spin))
         used = step("relative", i, passed + spin, lambda: spin)

@@ -101,6 +101,14 @@ def test_what_nothing_explains_names_the_entries():
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
+def test_a_robot_of_slides_alone_has_no_sine_that_is_wrong():
+    """A number that nobody writes: causes that are likelier are sought, among them sines."""
+    slides = replace(ARM, kind=("slide",) * 3)
+    M = tmt.mass_matrix(Q, slides) + np.diag([0.1234567891, 0.0, 0.0])
+    found = diagnose(slides, Values.of(slides, Q, QD, M, None))
+    assert "armature of alpha" in {cause.place for cause in found.causes}
+
+
 def test_what_no_body_can_have_is_not_offered():
     assert not any("armature of gamma" in cause.place for cause in diagnosis(added(5, -0.1)).causes)
 

@@ -74,15 +74,15 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
 def test_a_number_may_be_off_by_64_eps_of_its_scale(quantity, stated, scale, share, passes):
     off, result = share * 64 * EPS * (scale or stated), Result("parameters")
     number = row_of(Stated("arm", quantity, stated, stated + off), {}, scale)
-    causes = compare_number(result, number, "", {})
+    causes = compare_number(result, number, "", {}).causes
     assert (result.checks[0].passed, not causes) == (passes, passes)
 
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
-    (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "", {})
+    (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "", {}).causes
     assert (cause.rank, cause.place, cause.stated, cause.explains) == (2, "mass of arm", 2.0, 2.5)
     result, vector = Result("parameters"), Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]))
-    places = [cause.place for cause in compare_number(result, vector, "", {})]
+    places = [cause.place for cause in compare_number(result, vector, "", {}).causes]
     assert places == ["com y of arm", "com z of arm"]
     assert failing(result) == ["com"]
 

@@ -128,7 +128,7 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     sections[2].result.rows = [3]
     parts = write(folder, report)
     whys = {
-        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "ValueError",
+        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "TypeError",
         "speed in report.md": "AttributeError", "gravity in index.html": "FileNotFoundError",
         "speed in index.html": "AttributeError",
     }  # fmt: skip

@@ -11,6 +11,7 @@ from small_runs import Lines
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result
+from compare.core.finding import Finding
 from compare.experiments import module, stability
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
@@ -190,6 +191,17 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
     assert found == numbers.split() and named in said, said
 
 
+def test_first_screen_of_several_experiments_has_the_answers_alone():
+    result = Result("stability", notes=[Finding("stability", "examined")])
+    result.top = [result.finding(kind) for kind in ("limits_at", "answer", "rest", "cures")]
+    several, alone = (
+        section_with("stability", result, ARM).result,
+        section_with("stability", result, ARM, True).result,
+    )
+    assert [text.kind for text in several.top] == ["answer", "cures"] and alone.top == result.top
+    assert [text.kind for text in several.notes] == ["limits_at", "rest", "examined"]
+
+
 def timed(engine, method, seconds, error, **more):
     return SpeedRow("s", engine, method, seconds=seconds, worst_error=error, **{"diverged": False} | more)
 
@@ -213,7 +225,7 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
     assert conclusions.reaching(rows[4:5], conclusions.TARGET) == []  # just outside of the error asked for
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt=0.00244140625, steps=2048))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    assert conclusions.cheapest_settings(result) == [rows[-2], rows[2]]
+    assert conclusions.cheapest_settings(result)["settings"] == [rows[-2], rows[2]]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
 
 

@@ -24,7 +24,7 @@ from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
 from . import numbers
-from .common import Numbers, causes_in_common
+from .common import causes_in_common
 from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, touches
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
@@ -55,8 +55,7 @@ def rows(setup: Setup) -> Result:
         result.rows += numbers.rows_of(number, unit, number.why if is_of_file else None)
         if number.stated is not None and not number.why:
             words = joints if number.quantity == "parent" else {}
-            causes = numbers.compare_number(result, number, unit, words)
-            compared.append(Numbers(number, unit, causes))
+            compared.append(numbers.compare_number(result, number, unit, words))
     result.causes = causes_in_common(compared, () if is_of_file else without_inertial(setup, dynamics))
     texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
     if extra := dynamics.additional_bodies():

@@ -13,7 +13,7 @@ from compare.core.text import say
 from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
 from compare.experiments.reduction import exact_motion, sub_blocks
-from compare.experiments.reduction.records import ReductionResult, SubsetRow
+from compare.experiments.reduction.records import SubsetRow
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
 from compare.truth.smallest import needed
@@ -111,7 +111,7 @@ def test_a_held_posture_with_springs_needs_nothing():
 
 
 def verdicts(check, *arguments):
-    result = ReductionResult("reduction", tables={"reduction_subsets": []})
+    result = Result("reduction", tables={"reduction_subsets": []})
     check(result, *arguments)
     return {check.quantity: check.passed for check in result.checks}
 
@@ -133,8 +133,8 @@ def test_errors_fall_at_the_order_of_the_method(coarse, fine, passed):
     assert list(verdicts(exact_motion.check_falling, "swing", coarse, fine).values()) == passed
 
 
-def swings(model, **scene) -> ReductionResult:
-    result = ReductionResult("reduction")
+def swings(model, **scene) -> Result:
+    result = Result("reduction")
     cases = [ARM.case("mine", locked=("alpha", "beta"), **scene)] if scene else ARM.cases
     for case in filter(exact_motion.is_pendulum, cases):
         exact_motion.compare_swing(result, setup_of(model), case)
