@@ -282,14 +282,6 @@ def test_a_slip_that_explains_a_part_alone_is_not_named(word, brought):
     assert word not in message_of(**brought(h, 9.0 * np.random.default_rng(4).normal(size=len(h))), **states)
 
 
-@pytest.mark.parametrize("factors, said", [
-    ([25.0, 1.0], "tau of hip: your acceleration takes 25 times it"),
-    ([1.0, 0.0], "tau of knee: your acceleration does not depend"),
-])  # fmt: skip
-def test_inputs_of_accelerations_are_named(factors, said):
-    assert said in message_of(acceleration=lambda q, v, t: acceleration(q, v, np.array(factors) * t))
-
-
 def test_accelerations_alone_have_a_mass_matrix_and_a_bias():
     heavier = PENDULUM.replace('mass="2"', 'mass="2.5"')
     message = message_of(heavier, acceleration=acceleration)

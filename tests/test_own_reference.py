@@ -10,8 +10,7 @@ import numpy
 import numpy as np
 import own_equations
 import pytest
-from in_process import InProcess, answered
-from small_runs import Lines
+from in_process import InProcess, Lines, answered
 
 from compare.core.text import say
 from compare.engines.own import OwnError

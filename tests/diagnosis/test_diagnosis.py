@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 
@@ -221,3 +222,10 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
 def test_a_zero_that_is_read_in_another_unit_is_its_angle(change, read, meant):
     cause = Place(OF_ZERO, "zero of knee", 0.0, "rad", 1.0).cause(change)
     assert (cause.kind, cause.explains, cause.stated) == ("number", pytest.approx(read), pytest.approx(meant))
+
+
+@pytest.mark.slow
+def test_no_fault_is_explained_by_something_else():
+    """Of a sample of those of `python -m tests.faults`."""
+    outcomes = [faults.outcome(fault)[0] for fault in faults.all_faults()[::23]]
+    assert "wrong" not in outcomes and sum(of in ("named", "tied") for of in outcomes) >= 0.75 * len(outcomes)

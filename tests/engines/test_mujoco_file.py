@@ -119,14 +119,6 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
 
 
-def test_the_model_that_is_read_is_small_and_has_its_contacts():
-    text = f"<mujoco>{ASSETS}{BODIES}</mujoco>"
-    reading = read(text)
-    assert mujoco.mj_sizeModel(mujoco.MjModel.from_xml_string(text)) > 3 * PIXELS**2
-    assert mujoco.mj_sizeModel(reading.model) < 1e5 and len(pickle.dumps(reading)) < 2e5
-    assert reading.model.ngeom == 5
-
-
 @pytest.mark.parametrize("why", REFUSED)
 def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
     if why == "leaves out the <inertial>" and mujoco.__version__ < "4":

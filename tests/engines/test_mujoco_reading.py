@@ -191,12 +191,6 @@ def test_parts_of_a_free_joint_and_others(parts, rng):
     assert_locked(read(text), [f"base {part}" for part in parts] + ["joint 2", "tail"], rng)
 
 
-def test_the_only_joint_of_a_file_may_be_locked():
-    for bare in (False, True):
-        model = Source(mjcf(PLAIN)).without({"j": 0.7}, bare)
-        assert (model.nv, model.nbody) == (0, 2) and model.body("b").quat[0] == pytest.approx(np.cos(0.35))
-
-
 def test_what_refers_to_a_locked_joint_goes_too(rng):
     more = TENDON.format('stiffness="3"') + (
         '<equality><joint joint1="j" joint2="k"/></equality><sensor><tendonpos tendon="t"/><jointpos joint="j"/></sensor>'

@@ -123,22 +123,6 @@ def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relat
     assert ways.relative(np.nan * off, exact, forces)[0] == np.inf
 
 
-FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
-<inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/><body><joint axis="0 0.6 0.8"/>
-<inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
-
-
-def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
-    """mjd_transitionFD makes a difference of less than 1e-15 rad zero; the components of a turn add to each other."""
-    setup = setup_of_file(FREE_WITH_HINGE)
-    case = setup.robot.cases[0]
-    q, qd, tau = case.q[None], np.full((1, 7), 0.1), np.zeros((1, 7))
-    subject = subjects.Subject("slow", "scene", case, case.tree, q, qd, tau)
-    task = ways.Task(subject, ("implicitfast",), False)
-    every = ways.measured(task, setup.engines["mujoco"], 1e-3)
-    assert max(share for one in every for share in one.shares.values()) <= 1.0
-
-
 @pytest.mark.parametrize("of_fourth", [8e3, 0.99e6])
 def test_where_two_terms_of_the_truncation_nearly_cancel_another_eps_tells_their_size(bent, of_fourth):
     """Those in eps^2 and eps^4, at 1e-2 or 1e-3."""

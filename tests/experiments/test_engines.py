@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edited import setup_of
+from edited import setup_of, setup_of_file
 from trees import tree_of_kinds
 
 from compare import engines
@@ -23,6 +23,7 @@ from compare.engines.outside.model import FROM_FILE, ReadModel
 from compare.engines.outside.order import Order
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
+from compare.experiments.engines.motion import free_scene
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.arm import ARM
@@ -215,6 +216,12 @@ def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, p
     assert result.rows[0].as_read_over_bar == result.rows[0].difference_over_bar  # nothing is set
 
 
+def test_an_engine_without_a_function_is_not_judged_by_it():
+    result = Result("engines")
+    compare_quantities(result, setup_of(), RECORDS["float64"], other("bias"))
+    assert [check.quantity for check in result.checks] == ["Mbar to exact", "qdd to exact"]
+
+
 @pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature"))
 def test_a_number_as_read_just_inside_and_just_outside(number):
     """Masses and moments are checked; a number that an engine drops or sets otherwise is a finding."""
@@ -284,6 +291,18 @@ def test_bodies_that_move_as_one():
     assert mass == 2.0 and np.linalg.eigvalsh(inertia) == pytest.approx([0.0, 0.5, 0.5])
     with_armature = dataclasses.replace(ARM.tree, armature=[0.1, 0.2, 0.3])
     assert numbers_of(with_armature)["armature"] == pytest.approx([0.1, 0.2, 0.3])
+
+
+HANGING = """<mujoco><worldbody><body><joint axis="0 1 0"/>
+<inertial pos="0 0 -0.25" mass="1" diaginertia="0.02 0.02 0.001"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("scheme, order", [("semi_implicit_euler", 2.0), ("rk4", 4.0), ("own", None)])
+def test_where_an_order_is_higher_tmts_same_scheme_has_it(scheme, order):
+    """A pendulum that is set going where no force acts: semi-implicit Euler's leading error vanishes."""
+    setup = setup_of_file(HANGING)
+    case, method = free_scene(setup), engines.Method("other", "a", 1, scheme)
+    assert integrators.order_of_twin(setup, case, method) == (order and pytest.approx(order, abs=0.1))
 
 
 @pytest.mark.parametrize("order", (1, 4))

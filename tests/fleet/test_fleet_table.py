@@ -142,11 +142,6 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
 
 
 EXPERIMENTS = "parameters", "mass"
-RIGHT = """parameters = 4
-[mass]
-Mbar = 1.5
-"M, bent" = 0.5
-"""
 
 
 def read(tmp_path, content):
@@ -176,22 +171,6 @@ def report(tmp_path, name, checks):
     content = {"checks": [dict(zip(fields, check)) for check in checks]}
     (folder / "results.json").write_text(json.dumps(content))
     return FileRow(file=name, verdict=AGREE, has_report=True)
-
-
-@pytest.mark.parametrize("checks, points", [
-    ([("parameters", "com", "a", True), ("mass", "Mbar", "bent", True), ("mass", "M", "bent", True)], 6.0),
-    ([("parameters", "com", "a", True), ("parameters", "com", "b", False), ("mass", "Mbar", "bent", True)], 1.5),
-    ([("mass", "M", "bent", True), ("mass", "M", "zero", False), ("mass", "Mbar", "zero", False)], 0.5),
-    ([("gravity", "Mbar", "bent", True)], 0.0),
-])  # fmt: skip
-def test_all_checks_of_an_entry_must_pass_and_one_at_least_be_there(checks, points, tmp_path):
-    rubric = read(tmp_path, RIGHT)
-    every = [("parameters", "", "", True), ("mass", "Mbar", "", True), ("mass", "M", "bent", True)]
-    rows = [report(tmp_path, "a.xml", checks), report(tmp_path, "b.xml", every)]
-    rows.append(FileRow(file="c.xml", verdict=REFUSED))
-    rows.append(FileRow(file="d.xml", verdict=AGREE, has_report=True, same_as="a.xml"))
-    rubric.award(rows, tmp_path)
-    assert [row.points for row in rows] == [points, 6.0, 0.0, points] and rubric.total == 6.0
 
 
 def test_a_check_that_no_file_has_is_named_with_those_that_are_known(tmp_path):

@@ -2,7 +2,6 @@
 
 import io
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from mujoco import MjModel
 from PIL import Image
 
 from compare.core.errors import Refused
-from compare.fleet.models import bundle, found_models, place_of_report, unpacked
+from compare.fleet.models import bundle, found_models, unpacked
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 
@@ -55,15 +54,6 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
             names("m/pipe.xml")
 
 
-def test_patterns_and_lists(here):
-    here(["m/a.xml", "m/b/c.xml", "m/b/d/e.xml", "n/a[1].xml", "m/b c.xml"])
-    assert names("m/*.xml") == ["m/a.xml", "m/b c.xml"]
-    assert names("m/**/*.xml") == ["m/a.xml", "m/b c.xml", "m/b/c.xml", "m/b/d/e.xml"] == names("m/**")
-    assert names("n/a[1].xml") == ["n/a[1].xml"]  # a file of that name comes before the pattern
-    here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\nn/a[1].xml\r\n@more.txt\r\n")
-    assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"]
-
-
 @pytest.mark.parametrize("asked, says", [
     (["m/a.xml", "m/*.mjcf"], r"m/\*.mjcf"), (["m\n\0"], r"m\\n\\x00"), (["@m"], "list m"), (["@bad.txt"], "m/c.xml"),
 ])  # fmt: skip
@@ -73,15 +63,6 @@ def test_a_word_that_names_nothing_is_refused_in_one_line(asked, says, here):
     with pytest.raises(Refused, match=says) as refused:
         found_models(asked)
     assert len(str(refused.value).splitlines()) == 1
-
-
-def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
-    asked = ["a/b.xml", "/a/b.xml", "../a/b.xml", "../../a/b.xml", "a/../b.xml", "b.xml", "up/a/b.xml",
-             "ü/b.xml" if sys.getfilesystemencoding() == "utf-8" else "u/b.xml", "a/B.xml/c.xml"]  # fmt: skip
-    places = [place_of_report(shown) for shown in asked]
-    assert len({place.casefold() for place in places}) == len(asked) and places[0] == "files/a/b.xml"
-    assert not any(other.startswith(f"{place}/") for place in places for other in places)
-    assert all((tmp_path / place).resolve().is_relative_to(tmp_path / "files") for place in places)
 
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"

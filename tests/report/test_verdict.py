@@ -5,9 +5,9 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from in_process import Lines
 from matplotlib.colors import to_hex
 from sections import BAD, GOOD, section
-from small_runs import Lines
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result
@@ -94,15 +94,6 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     assert (standing(section("mass", GOOD))[0], standing(section("mass"))[0]) == (True, None)
     assert counts(section("trajectory", ("open loop", None, 1.0, "at most", True)))[0] == 1  # it diverged
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
-
-
-def test_an_experiment_alone_is_named_and_a_step_that_is_not_stable_comes_first():
-    alone, other = section("stability", GOOD, OWN_STEP), section("mass", GOOD)
-    first, second, *_ = verdict([alone], 12, robot="leg.xml").split("\n")
-    assert first.startswith("leg.xml is not stable at its own step")
-    assert "agree in stability: 1 of 2" in second
-    lines = verdict([alone, other], 12, robot="leg.xml").split("\n")
-    assert lines[0] == first and "agree: 2 of 3" in lines[1] and "2 of 12 experiments" in lines[2]
 
 
 def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():

@@ -273,7 +273,6 @@ def run(step: Step, advance: Advance) -> Code:
 
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
-    """Why a state cannot be gone on from; 0: it can."""
     kind = wide(DOUBLE, width)
     hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
     total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)

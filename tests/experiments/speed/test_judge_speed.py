@@ -1,6 +1,5 @@
 """What is concluded from errors, orders and times, every rule with a row just inside and one just outside; what is timed."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from compare.core.rows import Row
 from compare.core.text import say
 from compare.engines import Method, Setting
-from compare.experiments import speed
 from compare.experiments.speed import conclusions, evaluations, runs
 from compare.experiments.speed.runs import Run, SceneRuns, SpeedResult, SpeedRow
 
@@ -159,16 +157,3 @@ def test_a_row_gets_the_least_of_its_times(monkeypatch):
     monkeypatch.setattr(runs.timing, "in_turns", lambda calls, rounds: [[3e-3, 2e-3, 5e-3], [0.2]])
     runs.take_times(found, [(None, 1.0), (None, 2.0)])
     assert [run.row.seconds for run in found] == [2e-3, 0.4]
-
-
-def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeypatch):
-    log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
-    known, called = run_of("tmt", "rk4", 1.0), [run_of("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
-    follow = lambda *_, compiled: log.append(compiled) or called  # noqa: E731
-    take = lambda runs, calls: log.append(runs == calls == [known, called[0]])  # noqa: E731
-    acts = {"runs_of": follow, "prepared": lambda case, runs, engines: runs, "take_times": take}
-    for name, act in acts.items():
-        monkeypatch.setattr(speed, name, act)
-    scene = SceneRuns(setup.robot.cases[0], None, 0.0, [known])
-    speed.add_times(setup, [scene])
-    assert log == ["quiet", False, True] and scene.runs == [known, *called]

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import pytest
 from edited import setup_of_file
@@ -15,8 +14,7 @@ from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
 from compare.experiments.stability import figures_stability, of_file
 from compare.experiments.stability.of_file import MODES, PUSHED
-from compare.stability.answer import Asked, PlaceAnswer, StepLimitRow
-from compare.stability.cures import Cure
+from compare.stability.answer import StepLimitRow
 from compare.stability.place import posture_of, standing_at
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
@@ -125,28 +123,6 @@ def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
     assert result.top[0] is answers_of(result)[0]
     (cures,) = (finding.values for finding in result.top if finding.kind == "cures")
     assert {cure.change for cure in cures["cures"]} >= {"less_kv", "more_armature"}
-
-
-def test_changes_that_help_are_those_at_the_posture_that_is_told(result):
-    rows = [
-        step_row(posture=name, predicted_dt=dt, stable_at_file_dt=False)
-        for name, dt in (("p", 0.05), ("q", 0.02))
-    ]
-    places = [PlaceAnswer([row], {}, [Cure(row.posture, 2.0)]) for row in rows]
-    step = of_file.AtStep(Asked(0.1, "Euler", []), True, (), ())
-    of_file.add_answer(result, places, step, [SimpleNamespace(outcome="calm")])
-    assert result.top[-1].values["cures"] == [Cure("q", 2.0)]
-
-
-@pytest.mark.parametrize("longest, stable", [(0.16, ["RK4"]), (0.09, [])])
-def test_integrators_whose_limit_is_above_a_requested_step_make_it_stable(result, longest, stable):
-    """The requested step is asked of its own integrator alone; the limits of the others are those of the file's step."""
-    elsewhere = step_row(posture="q", integrator="discrete")
-    result.tables["step_limits"] = [step_row(), step_row(integrator="RK4", predicted_dt=longest), elsewhere]
-    row = step_row(predicted_dt=0.02, stable_at_file_dt=False)
-    step = of_file.AtStep(Asked(0.1, "Euler", []), True, (), ())
-    of_file.add_answer(result, [PlaceAnswer([row], {}, [])], step, [SimpleNamespace(outcome="calm")])
-    assert result.top[-1].values["integrators"] == stable and result.top[-1].values["tried"] == ["RK4"]
 
 
 def test_a_posture_that_is_asked_for_is_the_only_one():

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from trajectory_curves import CASES, FREE, HELD, run_of
+from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
 from compare.core.check import Result
@@ -140,3 +140,20 @@ def test_drift_is_measured_where_nothing_takes_energy_and_an_engine_that_does_no
     assert {row.scene for row in result.tables["energy"]} == {"bent, free"} and len(drifts) == 6
     assert drifts["RK4", "mujoco"] == 0.0 < drifts["RK4", "tmt"]
     assert not any(check.passed for check in result.checks if ", MuJoCo" in check.scene)
+
+
+@pytest.mark.parametrize("ended", [None, 1.0])
+def test_the_drift_of_the_energy_is_told_of_the_coarsest_step_where_a_file_is_free_and_undamped(
+    ended, engines
+):
+    free, damped = (replace(case, scene=replace(case.scene, tags=("own",))) for case in (FREE, DAMPED))
+    run = run_of(free, theirs=0.1, ended=(None, ended))
+    # the last is the arm's
+    others = run_of(free, steps=128), run_of(damped), run_of(CASES["zero, free"])
+    result = TrajectoryResult("trajectory", runs=[run, *others])
+    result.tables["energy"] = []
+    errors.find_energy(result, engines["mujoco"])
+    (row,) = result.tables["energy"]
+    energy = tmt.energy(run.paths["mujoco"].q, run.paths["mujoco"].v)
+    drift = None if ended else pytest.approx(np.abs(energy - energy[0]).max())
+    assert (row.scene, row.dt, row.drift) == (free.name, 5.0 / 64, drift) and len(result.top) == 1

@@ -16,7 +16,7 @@ from compare.engines.tmt import Tmt
 from compare.experiments.trajectory import figures_runs, motion, runs
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import diverged_at
-from compare.robots.arm import ARM, landmarks
+from compare.robots.arm import ARM
 from compare.robots.stick import as_seen, stick_figure
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
@@ -170,16 +170,6 @@ def followed(engines):
 def drawn(followed):
     (run,) = motion.drawn_runs(ARM, followed)
     return motion.pictures_of(run)
-
-
-def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, followed):
-    run = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 256))
-    np.testing.assert_array_equal(drawn.t, run.t[::2])
-    for name, path in run.paths.items():
-        points = [[np.array([*point], float) for point in landmarks(q)] for q in path.q[::2]]
-        np.testing.assert_allclose(drawn.points[name], as_seen(np.array(points)), atol=1e-15)
-    apart = np.abs(run.paths["tmt"].q - run.paths["mujoco"].q).max(axis=1)
-    np.testing.assert_array_equal(drawn.apart, apart[::2])
 
 
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():

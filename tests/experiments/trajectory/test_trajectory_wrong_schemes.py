@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from edited import setup_of_file
 from models import PATHS
 from trajectory_curves import CASES
 
+from compare.engines.own import Own
+from compare.experiments.trajectory import within_time
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
@@ -101,3 +104,12 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
     found = failing(*gripper, integrator)
     compiled_runs.clear()
     assert found == {(integrator, level) for level in STEPS}
+
+
+def test_equations_of_ones_own_have_no_servos(gripper):
+    own = Own(SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)}))
+    cases, setup = gripper[0].robot.cases, SimpleNamespace(engines={"own": own}, size="full")
+    able, said = within_time(setup, cases)
+    assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"]
+    assert len(said) == 1
+    assert own.methods_in(cases[-1]) == {} and own.methods_in(able[0])
