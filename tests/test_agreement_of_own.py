@@ -93,24 +93,6 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
     assert f"{name}: mismatched entries 1 / " in message_of(**{name: changed}, **states, rtol=rtol)
 
 
-def test_differences_are_every_entry_with_the_largest_ratio_first(given):
-    states, values = given
-    changed = values["bias"].copy()
-    changed[5, 1] += 1e-3
-    changed[2, 0] -= 1e-2
-    found = differences(bias=changed, **states)
-    ratios = [one.ratio for one in found]
-    assert len(found) == 24 and ratios == sorted(ratios, reverse=True)
-    first, second, third = found[:3]
-    assert {(one.entry, one.state.number) for one in (first, second)} == {("h[hip]", 2), ("h[knee]", 5)}
-    assert third.ratio <= 1.0 and third.cause == "" and first.cause == second.cause != ""
-    for one in found:
-        at = one.state.number, ["h[hip]", "h[knee]"].index(one.entry)
-        right = changed[at], values["bias"][at], one.yours - one.mujoco
-        assert (one.yours, one.mujoco, one.difference) == right
-        assert all(np.allclose(getattr(one.state, name), part[at[0]]) for name, part in states.items())
-
-
 def advised(mjcf=PENDULUM, **brought):
     _, found, rtol = message_of(mjcf, **brought).partition("state rtol=")
     return float(rtol.split()[0].rstrip(".")) if found else None
@@ -203,6 +185,11 @@ def test_the_probable_cause_of(brought, cause):
     assert cause in message_of(**brought)
 
 
+def test_no_other_error_is_told_where_accelerations_follow_from_a_wrong_bias():
+    follows = RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: acceleration(q, v, t, wrong_bias)}
+    assert message_of(**follows).count("acceleration") == 1 and SIGN in message_of(**follows)
+
+
 def test_the_cause_is_sought_where_there_are_values():
     q, qd, tau = np.random.default_rng(1).uniform(-2.0, 2.0, (3, 50, 2))
     values = np.array([wrong_bias(*state) for state in zip(q, qd)])
@@ -280,6 +267,22 @@ def test_a_slip_that_explains_a_part_alone_is_not_named(word, brought):
     """Right entries that are constant, one column of two, whole numbers."""
     states, h = table()
     assert word not in message_of(**brought(h, 9.0 * np.random.default_rng(4).normal(size=len(h))), **states)
+
+
+@pytest.mark.parametrize("more, is_rounded", [(0.0, True), (0.05, False)])
+def test_a_table_whose_states_are_rounded_too(more, is_rounded):
+    (states, h) = table()
+    rounded = {name: part.round(2) for name, part in states.items()}
+    message = message_of(bias=h.round(2) + more, **rounded)
+    assert ("to 2 decimals, and so are its states" in message) is is_rounded
+
+
+@pytest.mark.parametrize("factors, said", [
+    ([25.0, 1.0], "tau of hip: your acceleration takes 25 times it"),
+    ([1.0, 0.0], "tau of knee: your acceleration does not depend"),
+])  # fmt: skip
+def test_inputs_of_accelerations_are_named(factors, said):
+    assert said in message_of(acceleration=lambda q, v, t: acceleration(q, v, np.array(factors) * t))
 
 
 def test_accelerations_alone_have_a_mass_matrix_and_a_bias():

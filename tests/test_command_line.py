@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from argparse import ArgumentTypeError
 
 import pandas as pd
 import pytest
@@ -194,3 +195,12 @@ def test_a_bad_request_gets_one_line_and_status_2(arguments, capsys, monkeypatch
     assert (status, out, len(err.splitlines())) == (2, "", 1) and WRONG[arguments] in err, err
     assert err.startswith("python -m compare: ")
     assert {path.name for path in tmp_path.iterdir()} == FILES.keys()
+
+
+def test_values_at_the_edge_are_accepted_and_those_beyond_are_not():
+    options = command_line.request(["mass", "--reference", "a.py:b", "--joints", "-knee,hip"])
+    assert options.joints == "-knee,hip" and command_line.stated_reference("A.XML") == "A.XML"
+    assert [command_line.process_count(text) for text in ("1", "1024")] == [1, 1024]
+    for text in ("0", "1025", "-1", "two"):
+        with pytest.raises(ArgumentTypeError):
+            command_line.process_count(text)

@@ -11,9 +11,8 @@ from edited import XML, edited, setup_of, untimed_speed
 
 from compare.core.check import Result
 from compare.experiments import module, parameters, reduction, stability, trajectory
-from compare.report.verdict import Section
 from compare.robots.arm import ARM
-from compare.run.examine import Setup, new_causes
+from compare.run.examine import Setup
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
@@ -122,7 +121,6 @@ def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
 
 
 OF_A_SOLUTION = "rest"  # compared with a solution alone
-BODY = '<body name="forearm" pos="0 0 -0.3"'
 
 
 def found(text):
@@ -130,6 +128,10 @@ def found(text):
     failed = {check.quantity for check in result.checks if not check.passed}
     assert bool(failed) == bool(result.causes)
     return failed, result.causes
+
+
+def places(text):
+    return [cause.place for cause in found(text)[1]]
 
 
 def test_every_quantity_is_one_that_can_differ():
@@ -175,6 +177,9 @@ def test_contacts_are_a_cause_if_geoms_touch_in_a_scene_or_at_a_random_state():
     assert result.causes == [] and "nothing_touches" in [note.kind for note in result.notes]
 
 
+FINGERTIP = FOREARM.replace("0.15", "0.225").replace("1.5", "1.2")
+
+
 LOADED = '<inertial pos="0.18 0 0" mass="2" diaginertia="0.0011 0.0266 0.0266"/>'  # 0.5 kg at 0.27 m
 IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>'
 
@@ -201,12 +206,11 @@ def test_numbers_that_are_wrong_together_are_one_cause(edits, text):
     assert cause.text == text and cause.place == text.partition(":")[0]
 
 
-@pytest.mark.parametrize("edits, causes", [
-    # 90 degrees where radians are meant
-    ([(BODY, f'{BODY} euler="0 90 0"'), (GAMMA, f'{GAMMA} damping="0.1"')], ["zero of gamma", "damping of gamma"]),
-    ([(BETA, f'{BETA} pos="0.01 0 0"')], ["anchor x of beta", "com x of upper arm"]),
-])  # fmt: skip
-def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, causes):
-    setup = setup_of(edited(*edits), make=Setup, states=20)
-    sections = [Section("parameters", "", "", "", parameters.rows(setup))]
-    assert [cause.place for cause in new_causes(setup, sections, [])] == causes
+def test_what_is_wrong_for_another_reason_stays_another_cause():
+    """One of three joints, a mass by another factor, an inertia as well."""
+    edits = (BETA, f'{BETA} armature="0.1"'), (GAMMA, f'{GAMMA} armature="0.2"')
+    assert {*places(edited(*edits))} == {"armature of beta", "armature of gamma"}
+    assert len(places(edited(('mass="1.9"', 'mass="3.8"'), ('mass="1.5"', 'mass="3.1"')))) == 2
+    assert len(places(edited((FOREARM, FINGERTIP)))) == 2
+    no_body = LOADED.replace("0.0011 0.0266", "0.0009 0.0266")  # has this inertia
+    assert len(places(edited((FOREARM, no_body)))) == 3

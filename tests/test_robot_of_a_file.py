@@ -80,6 +80,11 @@ def test_three_slides_and_a_ball_in_one_place_are_free_and_float(before, shift, 
     assert (free_joints(tree), floats(tree)) == (free, floating)
 
 
+def test_a_free_body_is_thrown_up_and_tumbles():
+    scenes = {scene.name: scene for scene in robot_of(read(PATHS["free_body"]), "s.xml").scenes}
+    assert scenes["qpos0, thrown"].speed == (0.0, 0.0, 2.0, 120.0, 60.0, -90.0)
+
+
 def test_what_rests_where_it_is_let_go_is_set_going():
     still = replace(tmt.ARM, gravity=(0.0, 0.0, 0.0))
     names = [scene.name for scene in robot_of(file_of(still), "my.xml").scenes]

@@ -12,7 +12,6 @@ import tmt
 from compare.engines.mujoco import parse
 from compare.robots.arm import ARM
 from compare.robots.case import Case
-from compare.robots.scene import WrongField
 from compare.robots.scene_file import SceneError, read_scenes
 from compare.run.reference import compared_with
 
@@ -108,26 +107,6 @@ def test_the_number_of_steps_of_a_run_is_limited(tmp_path, steps, accepted):
         return refused(tmp_path, text, "20,000 steps")
     (scene,) = from_text(tmp_path, text)
     assert scene.steps == steps
-
-
-def error_of(robot=ARM, **fields) -> WrongField:
-    """The error with which a scene is refused."""
-    with pytest.raises(WrongField) as error:
-        robot.case(**{"name": "mine"} | fields)
-    return error.value
-
-
-@pytest.mark.parametrize("field, value, more", [
-    ("name", "a\nb", {}), ("judged", 5.001, {}), ("judged", -0.001, {}), ("gravity", "no", {}), ("locked", "beta", {}),
-    ("locked", ("wrist",), {}), ("locked", ("alpha", "beta", "gamma"), {}), ("speed", None, {}), ("speed", (1, 2), {}),
-    ("speed", (0, 1, 0), {"locked": ("beta",)}), ("duration", 0, {}), ("dt", 1e-300, {}), ("dt", 0.3, {}),
-    ("dt", 7.0, {}), ("damping", -1, {}), ("posture", "sitting", {}), ("posture", (1, 2), {}), ("torque", "pull", {}),
-    ("torque", "servos", {}), ("torque", (1, 2, np.inf), {}), ("targets", 2.0, {}),
-    ("targets", "far", {"torque": "servos"}),
-])  # fmt: skip
-def test_a_wrong_field_is_named(field, value, more):
-    error = error_of(**{field: value} | more)
-    assert error.field == field and "\n" not in str(error)
 
 
 def test_a_case_keeps_the_gravity_and_the_damping_of_the_file():

@@ -159,23 +159,6 @@ def test_each_cause_has_a_script():
     assert {find.__name__ for find in CAUSES} == {kind for kind, *_ in CASES}
 
 
-@pytest.mark.parametrize("engine, text, error", (
-    ("drake", MESHES.format("stl"), RuntimeError), ("drake", ARM.format("", HINGE, "").replace(' model="m"', ""), RuntimeError),
-    ("drake", ARM.format("", HINGE, ""), None),
-))  # fmt: skip
-def test_a_refusal_is_that_of_the_engine_and_not_credited_with_the_copy(engine, text, error, tmp_path):
-    skip_unless_installed(engine)
-    path = file_of(tmp_path, text)
-    reading = Outside(engine).of(compared_with("model", str(path)).robot.case()).reading
-    if error:
-        with pytest.raises(error):
-            drake(path)
-        assert reading["copied"][0] == "Refused"
-    else:
-        drake(path)
-        assert reading["copied"] is None
-
-
 @pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
 def test_masses_and_a_gravity_that_were_read_otherwise_are_set(engine, tmp_path):
     skip_unless_installed(engine)

@@ -119,6 +119,13 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
 
 
+def test_what_never_moves_has_its_part_of_a_total_mass():
+    mesh = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+    still = '<body><geom type="mesh" mesh="m"/></body>'
+    source = Source(mjcf(PLAIN + still, f'<compiler settotalmass="3"/>{mesh}'))
+    assert source.without_meshes().body("b").mass == source.model.body("b").mass < 3.0
+
+
 @pytest.mark.parametrize("why", REFUSED)
 def test_what_cannot_be_compared_is_refused_in_one_line(why, capfd):
     if why == "leaves out the <inertial>" and mujoco.__version__ < "4":

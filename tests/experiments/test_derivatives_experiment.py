@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from edited import setup_of_file
 
 import tmt
 from compare.core.finding import Finding
@@ -130,22 +129,6 @@ def test_where_two_terms_of_the_truncation_nearly_cancel_another_eps_tells_their
     exact = step.exact_values(bent, DT)
     values = {eps: exact.high + (eps**2 - of_fourth * eps**4) for eps in ways.SIZES}
     assert 0.3 < ways.share_of_differences(values, exact, bent, step, DT) < 0.6
-
-
-DAMPED = """<mujoco><worldbody><body pos="0 0 1"><joint axis="0 1 0" damping="{0}"/>
-<inertial pos="0.1 0 0" mass="2" diaginertia="0.01 0.02 0.02"/><body pos="0.3 0 0"><joint axis="0 1 0" damping="{0}"/>
-<inertial pos="0.2 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
-
-
-def test_rounding_is_carried_through_a_step_that_grows():
-    """Dampers with which a step of RK4 grows by 4e7: what its first stages round grows with it."""
-    setup = setup_of_file(DAMPED.format(1000))
-    case, mujoco = setup.robot.cases[0], setup.engines["mujoco"]
-    q, qd = np.array([[0.5, 0.7]]), np.array([[1e-6, -1e-6]])
-    tau = tmt.gravity_balance(q, case.tree)
-    subject = subjects.Subject("stiff", "scene", case, case.tree, q, qd, tau)
-    (*_, step) = ways.measured(ways.Task(subject, ("RK4",), False), mujoco, 2e-3)
-    assert step.rows[0].largest > 1e6 and max(step.shares.values()) <= 1.0
 
 
 def test_tmt_is_compared_with_mujocos_own_centred_function():

@@ -20,7 +20,6 @@ from compare.judge.scale import EPS, FACTOR
 from compare.robots.arm import ARM, PRINTED
 from compare.robots.states import Sample
 from compare.run.examine import Setup
-from tmt import literal
 from tmt.exact.many import Pairs
 
 OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of both engines that fail
@@ -91,13 +90,6 @@ def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not
         check_wide(result, comparisons)
         said = [("beta" in check.note, check.judged) for check in result.checks]
         assert said == [(True, False)] * (not judged)
-
-
-def test_accelerations_of_tmt_that_are_off_fail_their_own_checks(mujoco, monkeypatch):
-    right = literal.acceleration
-    monkeypatch.setattr(literal, "acceleration", lambda *states, **named: off(right(*states, **named)))
-    expected = {"qdd", "tau from TMT's qdd by mj_inverse", "dE/dt - tau.qd at TMT's qdd"}
-    assert failing(acceleration, mujoco) == expected
 
 
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda module: module.__name__.rpartition(".")[2])

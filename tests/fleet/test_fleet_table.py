@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+import random
 import re
 import shutil
 from functools import partial
@@ -91,6 +92,19 @@ def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stab
         assert row.stable_at_file_dt is (is_stable and stable is not False)
 
 
+def test_what_needs_a_look_comes_first():
+    right = [
+        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (NOT_JUDGED, None, 0.5, "a"),
+        (UNCONFIRMED, None, 0.5, "a"),
+        (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
+        (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
+    ]  # fmt: skip
+    fields = "verdict", "stable_at_file_dt", "worst_ratio", "file"
+    rows = [row(**dict(zip(fields, values))) for values in right]
+    for seed in range(20):
+        assert sorted(random.Random(seed).sample(rows, len(rows)), key=lambda row: row.order) == rows
+
+
 @pytest.mark.parametrize("before, now, named", [
     ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
     ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ"]),
@@ -144,6 +158,13 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
 EXPERIMENTS = "parameters", "mass"
 
 
+RIGHT = """parameters = 4
+[mass]
+Mbar = 1.5
+"M, bent" = 0.5
+"""
+
+
 def read(tmp_path, content):
     path = tmp_path / "points.toml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -171,6 +192,22 @@ def report(tmp_path, name, checks):
     content = {"checks": [dict(zip(fields, check)) for check in checks]}
     (folder / "results.json").write_text(json.dumps(content))
     return FileRow(file=name, verdict=AGREE, has_report=True)
+
+
+@pytest.mark.parametrize("checks, points", [
+    ([("parameters", "com", "a", True), ("mass", "Mbar", "bent", True), ("mass", "M", "bent", True)], 6.0),
+    ([("parameters", "com", "a", True), ("parameters", "com", "b", False), ("mass", "Mbar", "bent", True)], 1.5),
+    ([("mass", "M", "bent", True), ("mass", "M", "zero", False), ("mass", "Mbar", "zero", False)], 0.5),
+    ([("gravity", "Mbar", "bent", True)], 0.0),
+])  # fmt: skip
+def test_all_checks_of_an_entry_must_pass_and_one_at_least_be_there(checks, points, tmp_path):
+    rubric = read(tmp_path, RIGHT)
+    every = [("parameters", "", "", True), ("mass", "Mbar", "", True), ("mass", "M", "bent", True)]
+    rows = [report(tmp_path, "a.xml", checks), report(tmp_path, "b.xml", every)]
+    rows.append(FileRow(file="c.xml", verdict=REFUSED))
+    rows.append(FileRow(file="d.xml", verdict=AGREE, has_report=True, same_as="a.xml"))
+    rubric.award(rows, tmp_path)
+    assert [row.points for row in rows] == [points, 6.0, 0.0, points] and rubric.total == 6.0
 
 
 def test_a_check_that_no_file_has_is_named_with_those_that_are_known(tmp_path):

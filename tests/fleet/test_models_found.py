@@ -54,6 +54,15 @@ def test_a_folder_gives_its_mjcf_at_any_depth_and_nothing_else(here):
             names("m/pipe.xml")
 
 
+def test_patterns_and_lists(here):
+    here(["m/a.xml", "m/b/c.xml", "m/b/d/e.xml", "n/a[1].xml", "m/b c.xml"])
+    assert names("m/*.xml") == ["m/a.xml", "m/b c.xml"]
+    assert names("m/**/*.xml") == ["m/a.xml", "m/b c.xml", "m/b/c.xml", "m/b/d/e.xml"] == names("m/**")
+    assert names("n/a[1].xml") == ["n/a[1].xml"]  # a file of that name comes before the pattern
+    here("list.txt", "\ufeff# what is released\r\n\r\n  m/b c.xml  \r\nn/a[1].xml\r\n@more.txt\r\n")
+    assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"]
+
+
 @pytest.mark.parametrize("asked, says", [
     (["m/a.xml", "m/*.mjcf"], r"m/\*.mjcf"), (["m\n\0"], r"m\\n\\x00"), (["@m"], "list m"), (["@bad.txt"], "m/c.xml"),
 ])  # fmt: skip

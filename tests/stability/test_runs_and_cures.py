@@ -18,10 +18,10 @@ from compare.engines.mujoco.variants import (
 )
 from compare.stability import cures
 from compare.stability.control import controlled
-from compare.stability.growth import growth
+from compare.stability.growth import growth, push_of
 from compare.stability.limits import Tried, tried
 from compare.stability.motion import motion
-from compare.stability.runs import USUAL_PUSH, Runs
+from compare.stability.runs import USUAL_PUSH, WAYS, Runs, upwards
 
 WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
@@ -29,6 +29,10 @@ MOTORS = '<motor joint="turn" gear="2"/>'
 SPIN = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body><freejoint/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.02 0.03"/></body></worldbody>
   <keyframe><key qvel="0 0 0 0 {} 0"/></keyframe></mujoco>"""
+
+
+SWING = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="a" axis="0 1 0" {}/>
+  <geom size="0.05" pos="0 0 -0.5" mass="1"/></body></worldbody><keyframe><key qvel="3"/></keyframe></mujoco>"""
 
 
 def runs_of(text, integrator="Euler"):
@@ -90,6 +94,24 @@ def test_the_first_step_at_which_the_files_run_fails_is_found_wherever_the_deriv
     )
 
 
+class Directed(Runs):
+    """Runs that hold up to a step, s, of each way of a push."""
+
+    def run(self, push, dt, lasts, way=0):
+        return 0.0 if dt <= self.state[way] else np.inf
+
+
+@pytest.mark.parametrize(
+    "limits", [(0.1, 0.08, 0.08, 0.05), (0.1, 0.04, 0.02, 0.03), (0.1, 1e-3, 0.02, 0.02)]
+)
+def test_a_limit_holds_whichever_way_the_robot_is_pushed(limits):
+    low, high = Directed(None, np.array(limits), "Euler", 1e-4, None, 0.0).limit(2e-3, np.inf)
+    assert low <= min(limits) < high < 1.066 * low
+    rods = Step(place_of(two()).model, 2e-3, "Euler")
+    pushes = [push_of(rods, place_of(two()).rest, 1.0, way)[2:4] for way in WAYS]
+    assert np.linalg.matrix_rank(pushes) == 2 and (np.abs(pushes) == 1.0).all()
+
+
 def test_a_body_that_leaves_at_fine_steps_too_has_no_limit_of_the_step():
     """A weight that hovers: a push turns it, and it sinks sideways."""
     hover = """<mujoco><option timestep="0.01"/><worldbody><body pos="0 0 9"><freejoint/>
@@ -99,6 +121,12 @@ def test_a_body_that_leaves_at_fine_steps_too_has_no_limit_of_the_step():
     shown = runs_of(hover)
     assert shown.speed_after(1e-3, 0.01, 4.0) > 0.05
     assert shown.limit(0.01, np.inf) == (0.2, None)
+
+
+def test_steps_upwards_have_both_sides_of_a_limit_and_no_gap():
+    steps = [0.002, *upwards(0.002, 0.1)]
+    assert [steps.count(pytest.approx(mark)) for mark in (0.097, 0.103, 0.2)] == [1, 1, 1]
+    assert max(np.divide(steps[1:], steps[:-1])) < 1.500001 and steps == sorted(steps)
 
 
 # controllers

@@ -82,6 +82,11 @@ def test_runs_have_the_last_word(more, longest, by_runs):
     assert row.is_known is (row.limit != "saddle")
 
 
+@pytest.mark.parametrize("smooth, held", [(None, False), (0.0098, True), (0.0099, False)])
+def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
+    assert StepLimitRow(**ROW | {"smooth_dt": smooth}).is_held_by_friction is held
+
+
 def test_a_curve_has_the_growth_of_the_step_of_one_hinge():
     reading = read(hinge(20.0, 5.0))
     asked = Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)

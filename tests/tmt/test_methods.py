@@ -2,7 +2,6 @@
 
 import dataclasses
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
@@ -25,9 +24,6 @@ from tmt.methods.stepping import Method, advance
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 EPS = np.finfo(float).eps
-FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
-ORDERS = {name: METHODS[name].order for name in FIXED}
-ORDERS["rk4_mean_speed"] = 4  # of hinges; with balls see below
 
 
 def test_the_coefficients_of_dop853_are_those_of_scipy():
@@ -36,25 +32,6 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
     assert np.array_equal([*dop853.ERRORS[0], 0.0], DOP853.E5)  # with one of the slope at the end of the step
     assert np.array_equal([*dop853.ERRORS[1], 0.0], DOP853.E3)
-
-
-@pytest.mark.parametrize("name", FIXED)
-def test_order(name):
-    """One step against two halves: what they differ by falls with dt to the power of order + 1."""
-    implicit = METHODS[name].solves_stages  # those take long in many digits: doubles, at larger steps
-    number, large = (float, 0.04) if implicit else (mpmath.mpf, mpmath.mpf("0.01"))
-    rest, start = [number(0)] * 3, [number(float(a)) for a in BENT]
-
-    def after(steps, duration):
-        state = start, rest
-        for _ in range(steps):
-            state = one_step(METHODS[name], tmt.ARM, *state, rest, duration / steps)
-        return np.concatenate(state)
-
-    with mpmath.workdps(50):
-        coarse, fine = (max(abs(after(1, dt) - after(2, dt))) for dt in (large, large / 2))
-        order = float(mpmath.log(coarse / fine, 2)) - 1
-        assert order == pytest.approx(ORDERS[name], abs=0.3 if implicit else 0.15)
 
 
 def test_methods_keep_their_order_with_balls():

@@ -54,6 +54,10 @@ TUMBLES = """<mujoco><worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 
 <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
 
 
+STANDS = """<mujoco><worldbody><body pos="0 0 1"><joint name="{0}" type="slide" axis="0 0 1" stiffness="{1}" damping="100"/>
+<geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody></mujoco>"""
+
+
 def setup_for(xml, **request):
     return replace(setup_of_file(xml), alone=True, request=Request(**request), command="run --error 0.001")
 
@@ -273,6 +277,14 @@ def test_a_file_beyond_the_error_fails(two_arms):
         assert verdicts["motion without what is not used"] is passed
 
 
+@pytest.mark.parametrize("stiffness, name, moves", [(1000.0, "qpos0, at rest", False), (20.0, "qpos0", True)])
+def test_a_robot_that_stands_starts_at_its_rest(stiffness, name, moves):
+    """It sinks by 10 mm, or by half a meter: that is what it does."""
+    stands = scene(STANDS.format("plate", stiffness))
+    assert stands.name == name
+    assert (stands.use.ranges["plate"] > of_file.STILL) is moves
+
+
 def test_the_joints_that_a_tendon_ties_are_locked_together():
     """A hand whose thumb is still; the tendon and its servo go with it."""
     hand = scene(HAND, controls=waves("index"))
@@ -349,6 +361,15 @@ def test_a_file_whose_own_run_fails_is_not_judged():
     result = answered(DAMPED.format(0.02, 1.0))
     (check,) = result.checks
     assert not check.passed and "own run fails" in str(check)
+
+
+def test_a_run_that_fails_is_infinitely_far(two_arms):
+    """From the time on where it fails; of two motions, one."""
+    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    paths, others = arms.run(arms.whole), arms.run(arms.whole)
+    assert arms.apart(paths, others) == 0.0
+    others[0].q[-1, 3] = np.nan
+    assert arms.apart(paths, others) == arms.apart(2 * paths, paths + others) == np.inf
 
 
 def row(gain, error, locked=0, own=None) -> FrontierRow:

@@ -9,13 +9,11 @@ from servo_models import INERTIA
 
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
 from compare.engines.mujoco.names import INTEGRATORS
-from compare.engines.mujoco.reading import read
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
 from compare.experiments.stability import figures_stability, of_file
 from compare.experiments.stability.of_file import MODES, PUSHED
 from compare.stability.answer import StepLimitRow
-from compare.stability.place import posture_of, standing_at
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.05 0.05 0.05"/></body></worldbody><actuator>{actuator}</actuator>
@@ -123,16 +121,6 @@ def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
     assert result.top[0] is answers_of(result)[0]
     (cures,) = (finding.values for finding in result.top if finding.kind == "cures")
     assert {cure.change for cure in cures["cures"]} >= {"less_kv", "more_armature"}
-
-
-def test_a_posture_that_is_asked_for_is_the_only_one():
-    for asked in ("spin", "qpos0", "5.7"):
-        rows = found_of(posture=asked).tables["step_limits"]
-        assert {row.posture for row in rows} == {asked}
-    reading = read(TURNING.format(dt=0.002, actuator=MOTOR))
-    postures = [posture_of(text, reading) for text in ("home", "57.29578", "spin")]
-    asked = [standing_at(reading, posture).start[1] for posture in postures]
-    assert asked == pytest.approx([0.1, 1.0, 0.0])
 
 
 @pytest.mark.parametrize("actuator, gains", [(SERVO, {}), (MOTOR, {"kp": 20.0, "kv": 5.0})])
