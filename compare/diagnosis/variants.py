@@ -202,7 +202,8 @@ def factors_of(hinge: str) -> dict[str, tuple[str, ...]]:
     """What a product may have of a hinge, and what is taken for it."""
     sine, cosine = f"sin({hinge})", f"cos({hinge})"
     return {
-        "": (), sine: (cosine, ""), cosine: (sine, ""), f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
+        "": (), sine: (cosine, ""), cosine: (sine, ""),
+        f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
         f"{sine}^2": (f"{cosine}^2", sine, ""), f"{cosine}^2": (f"{sine}^2", cosine, ""),
     }  # fmt: skip
 
@@ -217,7 +218,7 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
     places.sort(key=lambda place: OF_FACTORS.index(place.kind))
     columns = [(place.name, place.column) for place in places if place.column is not None]
     multiplied = list(parallel(search, columns))
-    if not hinges or not added and not multiplied:
+    if not hinges or not (added or multiplied):
         return
     functions, pairs = functions_of(equations, hinges)
     changes = np.array([functions[wrong] - functions[right] for wrong, right in pairs])

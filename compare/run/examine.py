@@ -49,7 +49,7 @@ def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **mo
 
 
 def not_chosen(chosen: str) -> set[str]:
-    """The engines that read files and are not chosen, by names with commas. Refused: a name is none of these."""
+    """The engines that read files and are not chosen, by names. Refused: a name is none of these."""
     known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
     for name in names:
         if name not in (*ALWAYS, *known):
