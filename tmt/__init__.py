@@ -304,9 +304,6 @@ def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = AR
     [-1.2  0.   0. ]
     """
     _checked_model(model)
-    known = dict.fromkeys([*model.site_names, *model.body_names])
-    if not isinstance(name, str) or name not in known:
-        raise ValueError(f"there is no site or body {_shown(name)}; the model has {', '.join(known)}")
     speeds = np.zeros(model.coordinates.nv) if qd is None else qd
     pose, jacobian = (_answered(f"frame_{part}:{name}", model, q) for part in ("pose", "jacobian"))
     convective = _answered(f"frame_convective:{name}", model, q, speeds)

@@ -75,8 +75,9 @@ class Given:
                 k = int(np.argmax(off))
                 positions = zip(equations.coordinates.positions[:MOST_POSITIONS], equations.q[k])
                 at = tuple(f"{name} = {value:.6g}" for name, value in positions)
-                pair = (x if abs(x) > tolerances[entry][k] else 0.0 for x in (yours[k], right[entry][k]))
-                details.append(Detail(entry.named(equations.speeds), *pair, at))
+                numbers = (x if abs(x) > tolerances[entry][k] else 0.0 for x in (yours[k], right[entry][k]))
+                your_number, right_number = numbers
+                details.append(Detail(entry.named(equations.speeds), your_number, right_number, at))
         return tuple(details)
 
     @property

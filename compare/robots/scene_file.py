@@ -76,13 +76,10 @@ def entries_of(path: str | Path) -> list[dict[str, Any]]:
     if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
         raise SceneError(f"{path} is not a regular file; expected a TOML file")
     try:
-        content = tomllib.loads(Path(path).read_bytes().decode())
-    except OSError as error:
-        raise SceneError(f"cannot read {path}: {error.strerror}; expected a TOML file") from None
-    except RecursionError:
-        raise SceneError(f"{path} is nested too deep; expected tables [[scene]]") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"{path} is not TOML: {' '.join(str(error).split())}") from None
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:  # TOML's and Unicode's errors are ValueErrors
+        why = "it is nested too deep" if isinstance(error, RecursionError) else " ".join(str(error).split())
+        raise SceneError(f"{path} is not a TOML file that can be read: {why}") from None
     if others := content.keys() - {"scene"}:
         raise SceneError(f"{path}: {min(others)} is unknown; expected tables [[scene]]")
     entries = content.get("scene")

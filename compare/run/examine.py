@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -147,14 +147,17 @@ class Run:
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
         say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))
-        for text in section.result.top if len(self.names) > 1 else ():  # else it is the last line of the run
+        for text in (
+            section.result.top if len(self.names) > 1 else ()
+        ):  # else they are the last lines of the run
             self.terminal.say(f"  {say(text)}")
 
     def section_of(self, name: str) -> Section:
         """The section of an experiment, which is run for it; of one that raises with the error alone."""
         rows, work = functions(name).rows, [self.work[name]] if name in self.work else []
         result = None if name in self.crashed else self.attempt(name, rows, self.setup, *work)
-        section = self.attempt(name, section_with, name, result, self.setup.robot) if result else None
+        about = name, result, self.setup.robot, len(self.names) == 1
+        section = self.attempt(name, section_with, *about) if result else None
         return section or Section(name, name, "", "", self.crashed[name])
 
     def draw(self, section: Section) -> None:
@@ -184,12 +187,17 @@ class Run:
         self.clock.ends(END)
 
 
-def section_with(name: str, result: Result, robot: Robot) -> Section:
+def section_with(name: str, result: Result, robot: Robot, is_alone: bool = False) -> Section:
+    """The section of an experiment; of a run of several the first screen has the answers alone."""
     experiment = functions(name)
+    title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
     result.headline = result.headline or experiment.headline(result)
+    if not is_alone:
+        top = [text for text in result.top if text.kind in record.first_screen]
+        notes = [text for text in result.top if text not in top] + result.notes
+        result = replace(result, top=top, notes=notes)
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
-    title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
     return Section(name, title, claim, tolerance, result, record=record)
 
 

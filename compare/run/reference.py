@@ -95,6 +95,10 @@ class Compared(NamedTuple):
             name = integrator_by_name(integrator or self.reading.integrator)
             if asked["posture"]:
                 posture_of(asked["posture"], self.reading)
+            if asked["points"]:
+                from ..engines.mujoco.smaller import spec_with_points  # imports are slow
+
+                spec_with_points(self.reading.source, asked["points"].split(","))
         except ValueError as error:
             raise ModelError(f"{' '.join(given)}: {error}") from None
         period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
@@ -103,10 +107,10 @@ class Compared(NamedTuple):
         if asked["controls"]:
             names = [actuator.name for actuator in self.reading.drive.actuators]
             asked["controls"] = read_controls(asked["controls"], names)
-        if asked["write"] and not Path(asked["write"]).absolute().parent.is_dir():
-            raise ModelError(f"cannot write {asked['write']}: there is no such folder")
-        if asked["write"] and Path(asked["write"]).resolve() == Path(str(self.reading.source)).resolve():
-            raise ModelError(f"cannot write {asked['write']}: it is the file of the robot itself")
+            if options.scenes:
+                raise ModelError("--controls and --scenes both say what the robot does")
+        if asked["write"] and (why := not_writable(Path(asked["write"]), str(self.reading.source))):
+            raise ModelError(f"cannot write {asked['write']}: {why}")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 
@@ -149,6 +153,15 @@ def compared_with(
     own = own_engine(reference, robot, mujoco, joints)
     robot = replace(robot, own=tuple(own.equations.functions))
     return Compared(of_file._replace(kind="own", own=own), robot, mujoco, reading)
+
+
+def not_writable(path: Path, robot: str) -> str:
+    """Why a smaller file cannot be written there, "" if it can. robot: the path of its file."""
+    if path.is_dir():
+        return "it is a folder"
+    if not path.absolute().parent.is_dir():
+        return "there is no such folder"
+    return "it is the file of the robot itself" if path.resolve() == Path(robot).resolve() else ""
 
 
 def with_arm(source: Source, path: Text, shown: str) -> Compared:

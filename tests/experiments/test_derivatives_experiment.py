@@ -100,7 +100,7 @@ def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
     dynamics, state = mujoco.of(bent.case), (bent.q[0], bent.qd[0], bent.tau[0])
     for centred in (False, True):
         functions = of_transition, of_steps
-        own, steps = (f(dynamics, *state, DT, "implicitfast", 1e-6, centred)() for f in functions)
+        own, steps = (f(dynamics, *state, DT, "implicitfast", centred, 1e-6)() for f in functions)
         assert np.abs(own - steps[:, :6]).max() < 1e-8
     inverse = of_inverse(dynamics, *state[:2], np.ones(3), 1e-7)()
     truth = np.hstack(ways.tmt.inverse_dynamics_derivatives(*state[:2], np.ones(3), bent.tree))

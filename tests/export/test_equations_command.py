@@ -172,11 +172,13 @@ def test_a_text_that_does_not_compile_has_failed(tmp_path):
 @pytest.mark.parametrize(("words", "why"), [
     ("--to fortran --out new", "fortran"), ("--to pyton --out new", "did you mean python"), ("--name 2nd --out new", "2nd"),
     ("--name double --out new", "double"), ("--name bias --out new", "bias"), ("--quantity mass --out new", "mass"),
+    ("--quantity frame_pose:nose --out new", "nose"), ("--out file/below", "file is not a folder"),
     ("--to python --float --out new", "single precision"), ("--out .", "exists"), ("", "--out"), ("--outt x", "--outt"),
     ("--mjcf missing.xml --out new", "missing.xml"), ("more --out new", "more"),
 ])  # fmt: skip
 def test_a_wrong_request_gets_one_line_and_status_2(words, why, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").touch()
     status, _, error = answered(["equations", *words.split()], capsys)
     assert status == 2 and why in error and error.count("\n") == 1 and not (tmp_path / "new").exists()
 

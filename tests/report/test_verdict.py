@@ -11,6 +11,7 @@ from small_runs import Lines
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result
+from compare.core.finding import Finding
 from compare.core.text import say
 from compare.experiments import figures as figures_of_states
 from compare.experiments import module, stability
@@ -196,6 +197,17 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
     said = headline(section_with(name, of.result, ARM))
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))
     assert found == numbers.split() and named in said, said
+
+
+def test_first_screen_of_several_experiments_has_the_answers_alone():
+    result = Result("stability", notes=[Finding("stability", "examined")])
+    result.top = [result.finding(kind) for kind in ("limits_at", "answer", "rest", "cures")]
+    several, alone = (
+        section_with("stability", result, ARM).result,
+        section_with("stability", result, ARM, True).result,
+    )
+    assert [text.kind for text in several.top] == ["answer", "cures"] and alone.top == result.top
+    assert [text.kind for text in several.notes] == ["limits_at", "rest", "examined"]
 
 
 def timed(engine, method, seconds, error, **more):

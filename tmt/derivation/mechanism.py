@@ -65,12 +65,13 @@ class Mechanism(Generic[Number]):
         return bool(self.position_gain or self.speed_gain)
 
     def site_of(self, name: str) -> Site:
-        """The site of that name, or the frame of the joint that carries the body of that name; KeyError if there is neither."""
+        """The site of that name, or the frame of the joint that carries the body of that name; ValueError if there is neither."""
         if name in self.site_names:
             k = self.site_names.index(name)
             return Site(self.site_joint[k], self.site_offset[k], self.site_turn[k])
         if name not in self.body_names:
-            raise KeyError(name)
+            known = dict.fromkeys([*self.site_names, *self.body_names])
+            raise ValueError(f"there is no site or body {name!r}; the model has {', '.join(known)}")
         return Site(self.body_joint[self.body_names.index(name)], (0.0,) * 3, UNIT)
 
     def path(self, joint: int) -> list[int]:

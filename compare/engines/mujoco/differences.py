@@ -14,7 +14,7 @@ Call = Callable[[], np.ndarray]
 
 
 def of_transition(
-    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, eps: float, centred: bool
+    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool, eps: float
 ) -> Call:  # fmt: skip
     """A call of mjd_transitionFD: A (2 nv, 2 nv) of a step from a state (movement, v) under constant torque.
 
@@ -46,7 +46,7 @@ def of_inverse(dynamics: MujocoDynamics, q: Array, v: Array, a: Array, eps: floa
 
 
 def of_steps(
-    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, eps: float, centred: bool
+    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool, eps: float
 ) -> Call:  # fmt: skip
     """A call of mj_step from states nearby: [A B] (2 nv, 3 nv) of a step of any integrator, B by torque."""
     n, coordinates = len(dynamics.dofs), dynamics.coordinates
@@ -69,7 +69,7 @@ def of_steps(
 def transition(dynamics: MujocoDynamics, q: Array, tau: Array, dt: float, integrator: str) -> np.ndarray:
     """d(movement, speed)+/d(movement, speed) of one step at rest, (2nv, 2nv); q: (nq,) rad, m; tau: (nv,) N m."""
     n = len(dynamics.dofs)
-    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, NUDGE, centred=True)()[:, : 2 * n]
+    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, True, NUDGE)()[:, : 2 * n]
 
 
 def left_to_itself(

@@ -1,6 +1,6 @@
 """A compiled model with some of its joints locked: they are not there, and all else is where they hold it."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import mujoco
 import numpy as np
@@ -84,27 +84,44 @@ def add_parts(
 
 
 def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
-    """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
-    elements = [*spec.keys, *spec.sensors]
-    elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
-    for actuator in spec.actuators:
-        if actuator.target in removed or (bare and not actuator.armature):
-            elements.append(actuator)
-    elements += spec.tendons if bare else []
-    for element in (*elements, *[joint for joint in spec.joints if joint.name in removed]):
+    """Delete joints of these names, and what refers to them."""
+    needless = [*spec.keys, *spec.sensors]
+    if bare:
+        needless += [*spec.equalities, *(actuator for actuator in spec.actuators if not actuator.armature)]
+    for element in needless:
+        spec.delete(element)
+    delete_named(spec, spec.tendons if bare else ())
+    delete_named(spec, [joint for joint in spec.joints if joint.name in removed])
+
+
+def delete_named(spec: mujoco.MjSpec, elements: Collection[mujoco.MjsJoint | mujoco.MjsTendon]) -> None:
+    """Delete elements after what refers to them: the other way round MuJoCo crashes."""
+    names = {element.name for element in elements} - {""}
+    for element in (*spec.equalities, *spec.actuators, *spec.sensors):
+        fields = "name1", "name2", "target", "objname"
+        if names.intersection(getattr(element, field, "") for field in fields):
+            spec.delete(element)
+    for element in elements:
         spec.delete(element)
 
 
-def delete_meshes(spec: mujoco.MjSpec) -> None:
-    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
-    elements = [*spec.sensors, *spec.tuples, *spec.pairs]
-    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
-    elements += [geom for geom in meshes if not gives_inertia(geom)]
-    for element in elements:
+def delete_geoms(spec: mujoco.MjSpec, geoms: Collection[mujoco.MjsGeom]) -> None:
+    """Delete geoms, pairs of them, and meshes and height fields that no geom has then."""
+    names = {geom.name for geom in geoms} - {""}
+    pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & names]
+    for element in (*pairs, *geoms):
         spec.delete(element)
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
     for asset in [asset for asset in (*spec.meshes, *spec.hfields) if asset.name not in used]:
         spec.delete(asset)
+
+
+def delete_meshes(spec: mujoco.MjSpec) -> None:
+    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
+    for element in (*spec.sensors, *spec.tuples):
+        spec.delete(element)
+    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
+    delete_geoms(spec, [geom for geom in meshes if not gives_inertia(geom)])
 
 
 def gives_inertia(geom: mujoco.MjsGeom) -> bool:

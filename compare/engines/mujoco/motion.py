@@ -1,22 +1,20 @@
 """What a robot does: motions of a file with everything on, which smaller models of the file repeat; and what they use."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco import rollout
 
-from .names import INTEGRATORS, bit, control_of, element_name, number_of_actuators
+from .names import INTEGRATORS, bit, element_name, number_of_actuators
 
 Array = np.ndarray
-Places = Callable[[mujoco.MjModel], dict[str, tuple[slice, slice]]]  # joints or actuators
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-INPUTS = sum(
-    int(getattr(mujoco.mjtState, f"mjSTATE_{name}"))
-    for name in ("CTRL", "QFRC_APPLIED", "MOCAP_POS", "MOCAP_QUAT")
-)
+HELD = "QFRC_APPLIED", "MOCAP_POS", "MOCAP_QUAT"
+STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+INPUTS = sum(int(getattr(mujoco.mjtState, f"mjSTATE_{name}")) for name in ("CTRL", *HELD))
 NEAR, SAMPLES = 0.01, 25  # m, and states of a motion: pairs that came so near are told
 EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
 ACTS = {  # what has a row of constraints, by the kinds of rows
@@ -36,68 +34,65 @@ TIMERS = {  # the stages of a step by MuJoCo's timers
 
 def joints(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     """The places in qpos and qvel of each joint."""
-    ends_q, ends_v = [*model.jnt_qposadr[1:], model.nq], [*model.jnt_dofadr[1:], model.nv]
-    places = {}
-    for number, (q, v) in enumerate(zip(model.jnt_qposadr, model.jnt_dofadr)):
-        name = element_name(model, "joint", number)
-        places[name] = slice(int(q), int(ends_q[number])), slice(int(v), int(ends_v[number]))
-    return places
+    ends = [*model.jnt_qposadr.tolist(), model.nq], [*model.jnt_dofadr.tolist(), model.nv]
+    q, v = ([slice(*pair) for pair in pairwise(places)] for places in ends)
+    return {element_name(model, "joint", number): (q[number], v[number]) for number in range(model.njnt)}
 
 
-def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
-    """The places in ctrl and act of each actuator."""
-    places = {}
-    for number in range(number_of_actuators(model)):
-        control, count = control_of(model, number)
-        act, acts = max(0, model.actuator_actadr[number]), model.actuator_actnum[number]
-        name = element_name(model, "actuator", number)
-        places[name] = slice(control, control + count), slice(act, act + acts)
-    return places
-
-
-def columns(model: mujoco.MjModel, whole: mujoco.MjModel, places: Places) -> tuple[Array, Array]:
-    """Where the joints or actuators of a model are in the vectors of the whole model, as in joints or actuators."""
-    among, first, second = places(whole), list[int](), list[int]()
-    for name in places(model):
-        for numbers, place in zip((first, second), among[name]):
-            numbers += range(place.start, place.stop)
-    return np.array(first, dtype=int), np.array(second, dtype=int)
-
-
-def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
-    """At a state of step.start_of."""
-    data = mujoco.MjData(model)
-    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+def data_at(model: mujoco.MjModel, state: Array, whole: mujoco.MjModel) -> mujoco.MjData:
+    """The data of the whole model, which may have fewer bodies, at a state of step.start_of of a model."""
+    data, shared = mujoco.MjData(whole), np.zeros(mujoco.mj_stateSize(model, STATE | INPUTS))
+    mujoco.mj_extractState(model, state, mujoco.mjtState.mjSTATE_INTEGRATION, shared, STATE | INPUTS)
+    mujoco.mj_setState(whole, data, shared, STATE | INPUTS)
     return data
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion of a whole model, which smaller ones repeat. Controls are constant between their times.
+    """A motion of a whole model, which smaller ones repeat. All elements have names; controls are constant between times.
 
-    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls, (times, nu).
+    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of each
+    actuator, (times, controls of it).
     """
 
     name: str
     duration: float  # s
     start: mujoco.MjData
     times: Array  # s
-    inputs: Array
+    inputs: Mapping[str, Array]
 
     def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
         """The data of a model at the start."""
         data, start = mujoco.MjData(model), self.start
-        q, v = columns(model, start.model, joints)
-        controls, activations = columns(model, start.model, actuators)
-        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = start.qpos[q], start.qvel[v], start.qfrc_applied[v]
-        data.ctrl[:], data.act[:] = self.inputs[0, controls], start.act[activations]
+        for joint in joints(model):
+            here, there = data.joint(joint), start.joint(joint)
+            here.qpos[:], here.qvel[:], here.qfrc_applied[:] = there.qpos, there.qvel, there.qfrc_applied
+        for actuator in actuators(model):
+            data.actuator(actuator).ctrl[:] = self.inputs[actuator][0]
+            data.act[activations(model, actuator)] = start.act[activations(start.model, actuator)]
         data.mocap_pos[:], data.mocap_quat[:] = start.mocap_pos, start.mocap_quat
         return data
 
     def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
         """The controls of a model at each step, (steps, nu)."""
         at = np.searchsorted(self.times, dt * np.arange(steps) + EARLY, side="right") - 1
-        return self.inputs[np.maximum(at, 0)][:, columns(model, self.start.model, actuators)[0]]
+        inputs = [np.zeros((len(self.times), 0)), *(self.inputs[name] for name in actuators(model))]
+        return np.hstack(inputs)[np.maximum(at, 0)]
+
+
+def actuators(model: mujoco.MjModel) -> list[str]:
+    return [element_name(model, "actuator", number) for number in range(number_of_actuators(model))]
+
+
+def inputs_of(data: mujoco.MjData, times: int) -> dict[str, Array]:
+    """The controls of the data at a number of times, see Motion."""
+    return {name: np.tile(data.actuator(name).ctrl, (times, 1)) for name in actuators(data.model)}
+
+
+def activations(model: mujoco.MjModel, actuator: str) -> slice:
+    """The place in act of an actuator."""
+    first, count = model.actuator(actuator).actadr[0], model.actuator(actuator).actnum[0]
+    return slice(max(0, first), max(0, first) + count)
 
 
 class Path(NamedTuple):
@@ -170,7 +165,8 @@ def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, f
     every, every_other = round(steps / path.dt), round(steps / other.dt)
     q, whole = path.q[::every], other.q[::every_other]
     count = min(len(q), len(whole))
-    same = whole[:count, columns(path.model, other.model, joints)[0]]
+    places = joints(other.model)
+    same = np.hstack([whole[:count, places[name][0]] for name in joints(path.model)])
     apart = np.zeros((count, path.model.nv))
     for row, here, there in zip(apart, q[:count], same):
         mujoco.mj_differentiatePos(path.model, row, 1.0, there, here)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from .changed import state_as_compiled
-from .locked import Positions, compiled_without
+from .locked import Positions, compiled_without, delete_geoms, delete_named
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
 from .source import Source, is_from_geoms
@@ -27,6 +27,19 @@ DRAWN = "skins", "lights", "cameras", "textures"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 
 
+def spec_with_points(source: Source, points: Iterable[str]) -> mujoco.MjSpec:
+    """A copy of the file's spec with sites at bodies with these names. ValueError for a name that no body or site has."""
+    assert source.spec is not None
+    spec = source.spec.copy()
+    sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
+    for name in points:
+        if name not in sites | bodies:
+            raise ValueError(f"the file has no body and no site {name!r}")
+        if name not in sites:
+            spec.body(name).add_site(name=name)
+    return spec
+
+
 class Smaller:
     """A spec, all of whose elements have names, and its compiled model."""
 
@@ -38,15 +51,8 @@ class Smaller:
 
     @classmethod
     def whole(cls, source: Source, points: tuple[str, ...] = ()) -> "Smaller":
-        """The whole file. points: of bodies with such a name, sites are added. ValueError for a name that is neither."""
-        assert source.spec is not None
-        spec = source.spec.copy()
-        sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
-        for name in points:
-            if name not in sites | bodies:
-                raise ValueError(f"the file has no body and no site {name!r}")
-            if name not in sites:
-                spec.body(name).add_site(name=name)
+        """The whole file. points: see spec_with_points."""
+        spec = spec_with_points(source, points)
         first = cls(spec)
         for elements, kind in NAMED.items():
             for element in getattr(spec, elements):
@@ -105,11 +111,7 @@ def touchless(small: Smaller, is_needless: Callable[[mujoco.MjsGeom], bool]) -> 
     needless = [geom for geom in spec.geoms if is_needless(geom) and geom.name not in named]
     if needless:
         state_as_compiled(spec, small.model, [body.id for body in spec.bodies])
-    for geom in needless:
-        spec.delete(geom)
-    meshes = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
-    for elements in ("meshes", "hfields"):
-        small.delete(elements, lambda asset: asset.name not in meshes)
+    delete_geoms(spec, needless)
     return len(needless)
 
 
@@ -211,13 +213,7 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
     numbers = {number for number, name in enumerate(joints(model)) if name in positions}
     tied = [tendon for tendon in range(model.ntendon) if numbers.intersection(joints_of(model, tendon))]
     gone = {element_name(model, "tendon", tendon) for tendon in tied}
-    for elements in (spec.equalities, spec.actuators, spec.sensors):
-        for element in list(elements):
-            names = {getattr(element, field, "") for field in ("name1", "name2", "target", "objname")}
-            if names & gone:
-                spec.delete(element)
-    for tendon in [tendon for tendon in spec.tendons if tendon.name in gone]:
-        spec.delete(tendon)
+    delete_named(spec, [tendon for tendon in spec.tendons if tendon.name in gone])
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         fixed = compiled_without(spec, of_parts(model, positions), bare=False)

@@ -19,12 +19,13 @@ import mujoco
 import numpy as np
 
 from ...process.parts import is_pipe, named_by
-from .locked import FROM_GEOMS, Positions, compiled_without, delete_meshes, gives_inertia
+from .locked import FROM_GEOMS, Positions, compiled_without, delete_geoms, delete_meshes, gives_inertia
 from .names import moving
 from .welded import compiled, join, welded_bodies
 
 # by MuJoCo, of a mesh that is not there or in another format
 UNREAD = ("Error opening file", "no decoder found")
+DECODED = ".stl", ".obj", ".msh"
 PACKAGES = "is looked for in a folder NAME beside the file or above it, else beside the file"
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "which cannot be read": f"package://NAME/... {PACKAGES}",
@@ -116,7 +117,7 @@ class Source:
         try:
             self.model = compiled(spec)
         except ValueError as error:
-            if not is_unread(error):
+            if not any(words in str(error) for words in UNREAD):
                 raise
             files = [asset for asset in (*stated.meshes, *stated.hfields) if not is_read(stated, asset)]
             self.missing = tuple(asset.file for asset in files)
@@ -247,24 +248,10 @@ def place_of(address: str, path: Path) -> Path | None:
     return next((place for place in places if place.is_file()), None)
 
 
-def is_unread(error: ValueError) -> bool:
-    return any(words in str(error) for words in UNREAD)
-
-
 def is_read(spec: mujoco.MjSpec, asset: mujoco.MjsMesh | mujoco.MjsHField) -> bool:
-    """Whether MuJoCo can read the file of an asset, which is tried alone."""
-    alone = mujoco.MjSpec()
-    alone.modelfiledir, alone.meshdir = spec.modelfiledir, spec.meshdir
-    if isinstance(asset, mujoco.MjsMesh):
-        alone.add_mesh(name="asset", file=asset.file)
-        alone.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="asset")
-    else:
-        alone.add_hfield(name="asset", file=asset.file, size=asset.size)
-    try:
-        alone.compile()
-    except ValueError as error:
-        return not is_unread(error)
-    return True
+    """Whether the file of an asset is there, in a format that MuJoCo decodes."""
+    file = Path(spec.modelfiledir, spec.meshdir, asset.file)
+    return file.is_file() and (isinstance(asset, mujoco.MjsHField) or file.suffix.lower() in DECODED)
 
 
 def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
@@ -272,15 +259,10 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
     assets = [asset for asset in (*spec.meshes, *spec.hfields) if asset.file in missing and asset.file]
     names = {asset.name: asset.file for asset in assets}
     geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]
-    for geom in geoms:
-        if gives_inertia(geom):
-            body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
-            why = f"is that of its mesh {file}, which cannot be read"
-            raise ValueError(f"the inertia of body {body.name!r} {why}")
-    deleted = {geom.name for geom in geoms} - {""}
-    pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & deleted]
-    for element in (*pairs, *geoms, *assets):
-        spec.delete(element)
+    for geom in filter(gives_inertia, geoms):
+        why = f"is that of its mesh {names[geom.meshname or geom.hfieldname]}, which cannot be read"
+        raise ValueError(f"the inertia of body {geom.parent.name!r} {why}")
+    delete_geoms(spec, geoms)
 
 
 def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:

@@ -128,14 +128,8 @@ class Step:
         mujoco.mj_fwdPosition(self.model, self.data)
         return self.data.actuator_length.copy()
 
-    def commands(
-        self, servos: Sequence[Servo], state: np.ndarray, by: np.ndarray | None = None
-    ) -> np.ndarray:
-        """What a program computes for its servos from the lengths and speeds of a state that is moved, (k,)."""
-        self.put(state, by)
-        return self.commands_now(servos)
-
-    def commands_now(self, servos: Sequence[Servo]) -> np.ndarray:
+    def commands(self, servos: Sequence[Servo]) -> np.ndarray:
+        """What a program computes for its servos from the lengths and speeds of the data, (k,)."""
         length = self.lengths()
         mujoco.mj_fwdVelocity(self.model, self.data)
         speed = self.data.actuator_velocity
@@ -172,7 +166,7 @@ class Step:
 
         def act(step: int) -> None:
             if step % period == 0:
-                read.append(self.commands_now(servos))
+                read.append(self.commands(servos))
             if step >= delay:
                 self.data.ctrl[places] = read[(step - delay) // period]
 

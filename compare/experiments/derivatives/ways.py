@@ -1,6 +1,6 @@
 """The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; rows of the errors of each."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product, repeat
@@ -140,24 +140,18 @@ class Quantity(NamedTuple):
         scale = entries.derivatives(subject.tau, qdd, by)
         return entries.step(dt, by, scale) if self.integrator else np.concatenate(scale[:3], axis=2)
 
-    def differences(self, dynamics: MujocoDynamics, subject: Subject, dt: float, k: int) -> Iterator["Way"]:
+    def differences(self, dynamics: MujocoDynamics, subject: Subject, dt: float, k: int) -> list["Way"]:
         """MuJoCo's ways at state k."""
-        q, qd, tau = subject.q[k], subject.qd[k], subject.tau[k]
+        q, qd = subject.q[k], subject.qd[k]
         if self.name == INVERSE:
-            a = accelerations(subject)[k]
-            yield Way(BY_INVERSE, False, lambda eps: of_inverse(dynamics, q, qd, a, eps))
-        functions = {TRANSITION: of_transition, BY_STEPS: of_steps}
-        for (side, centred), (name, function) in product(
-            ((ONE_SIDED, False), (CENTRED, True)), functions.items()
-        ):
-            if self.integrator and not (self.integrator == "RK4" and function is of_transition):
-
-                def call(
-                    eps: float, function: Callable[..., Call] = function, centred: bool = centred
-                ) -> Call:
-                    return function(dynamics, q, qd, tau, dt, self.integrator, eps, centred)
-
-                yield Way(f"{name}, {side}", centred, call)
+            call = partial(of_inverse, dynamics, q, qd, accelerations(subject)[k])
+            return [Way(BY_INVERSE, False, call)]
+        functions = {} if self.integrator == "RK4" else {TRANSITION: of_transition}
+        functions, ways = functions | {BY_STEPS: of_steps} if self.integrator else {}, []
+        for side, (name, function) in product((ONE_SIDED, CENTRED), functions.items()):
+            state = dynamics, q, qd, subject.tau[k], dt, self.integrator, side == CENTRED
+            ways.append(Way(f"{name}, {side}", side == CENTRED, partial(function, *state)))
+        return ways
 
 
 class Way(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 import tmt
 from tmt import Tree
 
-from ...core.check import About
+from ...core.check import About, Result
 from ...core.text import block
 from ...engines.mujoco.motion import near, stages_of
 from ...engines.mujoco.names import number_of_actuators
@@ -23,7 +23,7 @@ from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ..setup import Setup
 from .limits import compared_limits, stable_answers
-from .records import FreeRow, JointRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
+from .records import FreeRow, JointRow, PairRow, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
 from .search import Answer, Locks, frontier, seconds_of, take_out
 from .sub_blocks import check_blocks, units_of
@@ -36,7 +36,7 @@ DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
 STILL = 1e-3  # rad or m: where no joint moves more, the robot stands
 
 
-def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
+def add(result: Result, setup: Setup, reading: Reading) -> None:
     """Rows, checks and findings of a motion of a file, the answer first."""
     allowed = setup.request.error or ERROR
     errors = allowed / TENFOLD, allowed, allowed * TENFOLD
@@ -90,7 +90,7 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
 
 
 def add_tables(
-    result: ReductionResult,
+    result: Result,
     scene: Scene,
     locks: Locks,
     names: list[str],
@@ -143,7 +143,7 @@ def use_of(scene: Scene) -> list[UseRow]:
 
 
 def add_checks(
-    result: ReductionResult,
+    result: Result,
     scene: Scene,
     free: Smaller,
     locked: Mapping[str, np.ndarray],
@@ -170,7 +170,7 @@ def add_checks(
     return scene.apart(paths, scene.run(small, row.dt, row.integrator))
 
 
-def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tree) -> None:
+def compare_locked(result: Result, where: str, tree: Tree, smaller: Tree) -> None:
     """Mbar and the bias of a Tree with joints locked, and of the smaller model, at random states."""
     coordinates, rng = Coordinates(tree.joint_names, tree.kind), np.random.default_rng(SEED)
     q, v = coordinates.random(rng, STATES), rng.uniform(-1.0, 1.0, (STATES, coordinates.nv))

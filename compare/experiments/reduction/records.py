@@ -1,9 +1,7 @@
 """What reduction finds: rows of its tables, and what each scene needs."""
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from ...core.check import Result
 from ...core.rows import Row, column
 
 
@@ -112,16 +110,3 @@ class FrontierRow(Row):
     gain: float = 1.0  # over the file as it is
     stable_at_rest: bool = True  # False: a step of an answer, or one as long, which is not stable there
     best_for: str = ""
-
-
-class Need(NamedTuple):
-    """The joints of a scene."""
-
-    needed: tuple[str, ...]
-    locked: tuple[str, ...]  # as the scene says
-    stays: tuple[str, ...]  # those that can be locked
-
-
-@dataclass
-class ReductionResult(Result):
-    needs: dict[str, Need] = field(default_factory=dict)  # by scene

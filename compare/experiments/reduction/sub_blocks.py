@@ -18,9 +18,8 @@ from .records import SubsetRow
 
 ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
 MOST_TO_LOCK = 2.0  # s that an exact state may take
-Differences = dict[
-    tuple[str, str], tuple[np.ndarray, np.ndarray]
-]  # by quantity and pair: of states, and their scales
+# by quantity and pair: of states, and their scales
+Differences = dict[tuple[str, str], tuple[np.ndarray, np.ndarray]]
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
@@ -60,12 +59,6 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
     return [(name,) for name in joints[:: -(-len(joints) // most)]]
 
 
-def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """The columns of the smaller case's positions and speeds among those of a case."""
-    joints = [case.coordinates.by_name[name] for name in smaller.joints]
-    return np.r_[tuple(joint.q for joint in joints)], np.r_[tuple(joint.qd for joint in joints)]
-
-
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
     """A check of the state closest to its tolerance, 64 eps x scale, and the row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
@@ -82,14 +75,12 @@ def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
 
     The difference of a state is the one closest to its tolerance, with its scale, as in `mass`.
     """
-    q, v = q.copy(), v.copy()
-    for name, position in case.locked.items():
-        joint = case.robot.coordinates.by_name[name]
-        q[:, joint.q], v[:, joint.qd] = position, 0.0
-    positions, speeds = columns_of(case, setup.robot.case())
-    free_q, free_v, scale = q[:, positions], v[:, speeds], Entries(setup.robot.tree, q, v)
+    speeds, states, free_q = case.indices("qd"), np.arange(len(q)), q[:, case.indices("q")]
+    rows, block = np.ix_(states, speeds), np.ix_(states, speeds, speeds)
+    q, free_v, still = case.positions_of_all(free_q), v[rows], np.zeros_like(v)
+    still[rows] = free_v
+    scale = Entries(setup.robot.tree, q, still)
     reduced, unlocked = setup.compared(case).values(), setup.compared().values()
-    block, rows = np.ix_(np.arange(len(q)), speeds, speeds), np.ix_(np.arange(len(q)), speeds)
     compared = {
         "Mbar": (
             [engine.mass_matrix(free_q) for engine in reduced],
@@ -98,7 +89,7 @@ def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
         ),
         "bias": (
             [engine.bias(free_q, free_v) for engine in reduced],
-            [engine.bias(q, v)[rows] for engine in unlocked],
+            [engine.bias(q, still)[rows] for engine in unlocked],
             scale.bias[rows],
         ),
     }

@@ -46,7 +46,6 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     cheapest = conclusions.cheapest_settings(result)
     if cheapest["settings"]:
         result.headline = result.finding("headline", **cheapest)
-        result.top.append(result.finding("answer", **cheapest))
     result.tables["what_should_i_use"] = conclusions.advice(result)
     result.find("columns")
     setup.progress("speed: one evaluation")

@@ -12,6 +12,7 @@ from edited import setup_of_file
 
 import tmt
 from compare.cli.command_line import request
+from compare.core.check import Result
 from compare.core.text import say
 from compare.engines.mujoco import ModelError
 from compare.engines.mujoco.motion import Simulation
@@ -21,7 +22,7 @@ from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
 from compare.experiments.reduction.limits import compared_limits, stable_answers
-from compare.experiments.reduction.records import FrontierRow, ReductionResult
+from compare.experiments.reduction.records import FrontierRow
 from compare.experiments.reduction.scene import scene_of
 from compare.experiments.reduction.search import answer_within, take_out
 from compare.experiments.setup import Request
@@ -71,8 +72,8 @@ def waves(*names):
     return {"time": times} | {name: 0.3 * np.sin(2.0 * np.pi * times) for name in names}
 
 
-def answered(xml, **request) -> ReductionResult:
-    setup, result = setup_for(xml, **request), ReductionResult("reduction")
+def answered(xml, **request) -> Result:
+    setup, result = setup_for(xml, **request), Result("reduction")
     of_file.add(result, setup, setup.reading)
     return result
 
@@ -162,7 +163,7 @@ def test_a_reduction_holds_in_all_of_the_scenes(tmp_path):
     both = SCENES.format("left", "20, 0, 0, 0") + SCENES.format("right", "0, 0, 20, 0")
     for scenes in (both, both.partition('"right')[0].rpartition("[[")[0]):
         path.write_text(scenes)
-        setup, result = setup_for(TWO_ARMS, write=str(written)), ReductionResult("reduction")
+        setup, result = setup_for(TWO_ARMS, write=str(written)), Result("reduction")
         setup = replace(setup, robot=setup.robot.with_scenes(read_scenes(path, setup.robot)))
         of_file.add(result, setup, setup.reading)
         assert [str(check) for check in result.checks if not check.passed] == []
@@ -194,13 +195,16 @@ def test_the_written_file_is_moved_with_its_meshes(tmp_path):
     assert "smaller_assets" in say(result.top[0])
 
 
-@pytest.mark.parametrize(
-    "place, message", [("arms.xml", "of the robot itself"), ("none/small.xml", "no such folder")]
-)
-def test_what_cannot_be_written_is_refused_at_once(tmp_path, place, message):
+@pytest.mark.parametrize("option, value, message", [
+    ("--write", "{}/arms.xml", "of the robot itself"), ("--write", "{}/none/small.xml", "no such folder"),
+    ("--write", "{}", "it is a folder"), ("--points", "nothing", "no body and no site 'nothing'"),
+])  # fmt: skip
+def test_what_the_file_does_not_have_or_cannot_be_written_is_refused_at_once(
+    tmp_path, option, value, message
+):
     path = tmp_path / "arms.xml"
     path.write_text(TWO_ARMS)
-    options = request(["reduction", "--mjcf", str(path), "--write", str(tmp_path / place)])
+    options = request(["reduction", "--mjcf", str(path), option, value.format(tmp_path)])
     with pytest.raises(ModelError, match=message):
         compared_with(None, str(path)).request_of(options)
 
@@ -258,7 +262,7 @@ def test_the_equations_of_the_smaller_model_are_those_of_tmts_lock(two_arms):
     where = "home, joints locked: 2"
     quantities = {check.quantity for check in result.checks if check.scene == where}
     assert quantities == {f"{name}, lock of tmt to the smaller model" for name in ("Mbar", "bias")}
-    whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, ReductionResult("reduction")
+    whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, Result("reduction")
     of_file.compare_locked(elsewhere, where, whole.lock({"right upper": 1.0, "left lower": 0.0}), written)
     assert not any(check.passed for check in elsewhere.checks)
 
@@ -272,7 +276,7 @@ def test_a_file_beyond_the_error_fails(two_arms):
     for share, free, written, passed in (
         (1.01, arms.whole, arms.whole, True), (0.99, heavier, arms.whole, False), (1.01, heavier, heavier, False),
     ):  # fmt: skip
-        result = ReductionResult("reduction")
+        result = Result("reduction")
         answer = SimpleNamespace(row=row, allowed=share * row.error, at_own_step=False)
         of_file.add_checks(result, arms, free, {}, answer, arms.whole, written)
         verdicts = {check.quantity: check.passed for check in result.checks}
@@ -412,7 +416,7 @@ def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
     smaller = read(small.model).tree
     heavier = replace(smaller, mass=tuple((1.0 + 1e-11) * mass for mass in smaller.mass))
     for other, passed in ((smaller, True), (heavier, False)):
-        result = ReductionResult("reduction")
+        result = Result("reduction")
         of_file.compare_locked(result, "legs locked", locked, other)
         assert all(check.passed for check in result.checks) is passed
 

@@ -18,7 +18,7 @@ EDITS = (
     ("trajectory.runs", "check_end", "alive or is_known or run.required", "True", "a run of a start alone passes"),
     ("run", "exchanged", "pull @ give @ pull / 2.0", "3 * pull @ give @ pull / 2.0", "the energy of servos x 3"),
     ("run", "exchanged", "case.tau - fed_back_at(*_1)", "case.tau + fed_back_at(*_1)", "servos push the other way"),
-    ("run", "work", "case.coordinates.difference(q, q[0]) * mean", "0.0 * mean", "the work of servos is a gain"),
+    ("run", "work", "moved * mean", "0.0 * mean", "the work of servos is a gain"),
     ("controller", "controller", "np.abs(moment) @ moved", "moment @ moved", "a tendon's target moves by a difference"),
     ("controller", "reason", "actuator.stiffness(u) < 0.0", "False", "what pushes away takes part, as another scheme"),
     ("engine", "methods_for", "lone or tree.has_gains", "lone", "velocity gains are thought explicit in implicitfast"),
