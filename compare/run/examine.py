@@ -57,11 +57,6 @@ def not_chosen(chosen: str) -> set[str]:
     return {*known} - {*names}
 
 
-def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:
-    """The experiments of a run, see Run, one after the other."""
-    return Run(names, setup, *place).examined()
-
-
 @dataclass
 class Run:
     """The experiments of one run. clock: of the workers, it measures each experiment.
@@ -90,6 +85,7 @@ class Run:
         self.early = () if is_large else [name for name in self.order if not self.too_long(name)]
 
     def examined(self) -> Examined:
+        """The experiments, one after the other."""
         (self.folder / "figures").mkdir()
         for name in self.early:
             if begin := functions(name).begin:
