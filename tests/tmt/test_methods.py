@@ -1,4 +1,4 @@
-"""Methods of integration: their tableaus, their orders, the derivatives of their steps, what they take implicitly."""
+"""Methods of integration, also a user's own: tableaus, orders, the derivatives of their steps, what they take implicitly."""
 
 import dataclasses
 
@@ -9,10 +9,20 @@ from scipy.integrate import DOP853
 from trees import random_state, random_states, small_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import runner_of
+from tmt.compiled import forms, runner_of
 from tmt.derivation import method
 from tmt.exact.motion import trajectory
-from tmt.methods import METHODS, amplification, derivatives, dop853, one_step
+from tmt.methods import (
+    METHODS,
+    RungeKutta,
+    SemiImplicitEuler,
+    amplification,
+    derivatives,
+    dop853,
+    method_named,
+    one_step,
+)
+from tmt.methods.stepping import Method, advance
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
@@ -27,8 +37,8 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert len(dop853.A) == DOP853.n_stages
     assert all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A))
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
-    assert np.array_equal([*dop853.ERROR_5, 0.0], DOP853.E5)  # with one of the slope at the end of the step
-    assert np.array_equal([*dop853.ERROR_3, 0.0], DOP853.E3)
+    assert np.array_equal([*dop853.ERRORS[0], 0.0], DOP853.E5)  # with one of the slope at the end of the step
+    assert np.array_equal([*dop853.ERRORS[1], 0.0], DOP853.E3)
 
 
 @pytest.mark.parametrize("name", FIXED)
@@ -160,3 +170,72 @@ def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
     assert DRIVEN.lock({"beta": 0.0}).position_gain == ((40.0, 0.0), (0.0, 20.0))
     with pytest.raises(ValueError, match=r"'beta' cannot be locked at 0\.3"):
         DRIVEN.lock({"beta": 0.3})
+
+
+class Midpoint(Method):
+    """The explicit midpoint rule, made from Method."""
+
+    order = 2
+
+    def step(self, slope, q, qd, dt):
+        half = advance(q, dt / 2, (1.0,), [qd]), advance(qd, dt / 2, (1.0,), [slope(q, qd)])
+        return advance(q, dt, (1.0,), [half[1]]), advance(qd, dt, (1.0,), [slope(*half)])
+
+
+def test_a_method_of_ones_own(rng, monkeypatch):
+    monkeypatch.setitem(METHODS, "mine", Midpoint())
+    monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))
+    mine = method_named("mine")
+    assert mine.stages == 2 and not (mine.adaptive or mine.solves_stages)
+    q, qd, tau = rng.uniform(-1, 1, (3, 9, 3))
+    found, same = (tmt.simulate(q, qd, tau, 0.01, 20, name) for name in ("mine", "tableau"))
+    assert found.evaluations == same.evaluations == 9 * 20 * 2
+    assert all(np.allclose(a, b, rtol=0, atol=1e-12) for a, b in zip(found, same))
+    with pytest.raises(ValueError, match="tolerance"):
+        tmt.simulate(BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)
+    monkeypatch.setitem(METHODS, "mine", METHODS["explicit_euler"])  # is used at once
+    assert not np.allclose(tmt.simulate(q, qd, tau, 0.01, 20, "mine").q, same.q, rtol=0, atol=1e-6)
+
+
+class Longer(RungeKutta):
+    """A step that is another than the tableau says."""
+
+    def step(self, slope, q, qd, dt, *joints):
+        return super().step(slope, q, qd, 2.0 * dt, *joints)
+
+
+class Weaker(RungeKutta):
+    """Half the accelerations."""
+
+    def slope(self, tree, q, qd, tau, dt, *dynamics):
+        return [0.5 * a for a in super().slope(tree, q, qd, tau, dt, *dynamics)]
+
+
+@pytest.mark.parametrize("own, form", [(Longer, 0), (Weaker, 0), (Weaker, 1)])  # composite; articulated
+def test_another_step_or_slope_is_taken_and_not_kept(own, form, folder, monkeypatch):
+    monkeypatch.setattr(forms, "FORMS", forms.FORMS[form : form + 1])
+    rk4 = METHODS["rk4"]
+    stepping = own(rk4.order, rk4.A, rk4.b, rk4.c)
+    monkeypatch.setitem(METHODS, "mine", stepping)
+    motion = tmt.simulate(BENT, [1.0] * 3, REST, 0.01, 2, "mine")
+    state = BENT.tolist(), [1.0] * 3
+    for k in (1, 2):
+        state = one_step(stepping, tmt.ARM, *state, [0.0] * 3, 0.01)
+        assert np.allclose(state, [motion.q[k], motion.qd[k]], rtol=0, atol=1e-12)
+    assert not list(folder.glob("*"))  # it may be another tomorrow, with the same name
+
+
+def test_the_jacobian_of_a_step_is_that_of_its_own_slope():
+    class Floating(SemiImplicitEuler):
+        def slope(self, tree, q, qd, tau, dt, dynamics):
+            return [0.0 * x for x in qd]
+
+    J = amplification(Floating(False), tmt.ARM, BENT, REST, REST, 0.5)
+    assert np.array_equal(J, np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]]))
+
+
+@pytest.mark.parametrize("own", [Midpoint, "rk4", None])
+def test_what_is_no_method_is_refused(own, monkeypatch):
+    monkeypatch.setitem(METHODS, "mine", own)
+    with pytest.raises(ValueError, match=r"^METHODS\['mine'\] is .* is expected$"):
+        tmt.simulate(BENT, REST, REST, 0.1, 1, "mine")

@@ -4,15 +4,10 @@ from collections.abc import Iterable, Sequence
 
 from .statements import Function, Program, Syntax, statements
 
-PYTHON = Syntax(
-    input="{x}{k}", assignment="{name} = {value}", result="{x}[..., {k}] = {value}", function="np.{}", arctan="arctan"
-)  # fmt: skip
-CASADI = Syntax(
-    input="{x}[{k}]", assignment="{name} = {value}", result="{x}[{k}] = {value}", function="casadi.{}"
-)
-MATLAB = Syntax(
-    input="{x}({n}, :)", assignment="{name} = {value};", result="{x}({n}, :) = {value};", times=".*", over="./"
-)  # fmt: skip
+NAMED = "{name} = {value}"
+PYTHON = Syntax("{x}{k}", NAMED, "{x}[..., {k}] = {value}", function="np.{}", arctan="arctan")
+CASADI = Syntax("{x}[{k}]", NAMED, "{x}[{k}] = {value}", function="casadi.{}")
+MATLAB = Syntax("{x}({n}, :)", f"{NAMED};", "{x}({n}, :) = {value};", times=".*", over="./")
 HEAD = '''import numpy as np
 
 NQ, NV = {nq}, {nv}

@@ -31,7 +31,6 @@ class Forms:
         self.known: dict[Polynomial, Expression] = {}
 
     def shortest(self, poly: Polynomial) -> Expression:
-        """The shortest expression that is found for a polynomial in symbols, sines and cosines."""
         count, terms, products = len(self.symbols), [], set()
         parts: dict[tuple[int, ...], Polynomial] = defaultdict(lambda: self.ring.functions.zero)
         for monomial, number in poly.items():
@@ -97,7 +96,6 @@ def cost(form: Expression) -> int:
 
 
 def term(number: Expression, form: Expression, symbols: Mapping[Expression, Expression]) -> Term:
-    """A term of a sum, of a number, an expression and further factors."""
     factors = dict(symbols)
     for factor in Mul.make_args(form):
         if factor.is_number:

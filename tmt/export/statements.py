@@ -66,7 +66,6 @@ class Line(NamedTuple):
 
 
 def statements(function: Function, syntax: Syntax) -> list[Line]:
-    """The assignments of a function, those of its results where they are known."""
     inputs = [syntax.input.format(x=x, k=k, n=k + 1) for x, k in function.inputs]
     places = [divmod(number, function.size) for number in range(len(function.traced.outputs))]
     results = [syntax.result.format(x=function.results[x], k=k, n=k + 1, value="{value}") for x, k in places]
@@ -74,8 +73,6 @@ def statements(function: Function, syntax: Syntax) -> list[Line]:
 
 
 class Writer:
-    """The assignments of a traced function and of its results, formats of their {value}, from its inputs."""
-
     def __init__(self, traced: Traced, inputs: Sequence[str], results: Sequence[str], syntax: Syntax):
         self.tape, self.syntax = traced.tape, syntax
         self.traced, self.results = traced, results
@@ -104,7 +101,6 @@ class Writer:
             yield Line(self.results[place].format(value=self.text(i)))
 
     def assigned(self, i: int, name: str, value: str) -> Line:
-        """The assignment of a node to a name, which stands for it from then on."""
         self.known[i] = name, ATOM
         return Line(self.syntax.assignment.format(name=name, value=value), name)
 

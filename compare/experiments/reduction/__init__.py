@@ -79,12 +79,12 @@ def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
         rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
         result.tables.setdefault("reduction_needs", []).extend(rows)
         groups.setdefault((names, case.scene.locked, need.stays), []).append(case)
-    for (needed, locked, stays), cases in sorted(
-        groups.items(), key=lambda group: bool(group[0][0] and group[0][2])
-    ):
+    for numbers, cases in sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2])):
         about, scenes = claim_values(cases[0].robot), [case.name for case in cases]
-        values = {"scenes": scenes, "needed": needed, "locked": locked, "stays": stays, "about": about}
-        result.top.append(result.finding("answer", **values))
+        moving, locked, stays = numbers
+        result.top.append(
+            result.finding("answer", scenes=scenes, needed=moving, locked=locked, stays=stays, about=about)
+        )
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:
