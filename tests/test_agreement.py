@@ -18,7 +18,7 @@ from compare.engines.mujoco import parse
 from compare.experiments import EXPERIMENTS, skipped
 from compare.report import files, verdict
 from compare.robots.arm import ARM
-from compare.run.examine import Setup, engines, examine
+from compare.run.examine import Run, Setup, engines
 
 LISTED = Path(__file__).with_name("checks_of_a_small_run.txt")
 MEASURED = re.compile(r"\d+\.\d+(e[-+]?\d+)?|\d+e[-+]?\d+")
@@ -61,7 +61,7 @@ def test_all_experiments_pass_and_draw_and_the_report_is_of_the_second_robot(tmp
     assert [name for name in reasons if name != "engines"] == ["published"]
     setup = Setup.small(robot, engines(parse(robot.mjcf, robot.tree)))
     names = [name for name in EXPERIMENTS if name not in reasons]
-    sections, causes, _ = examine(names, setup, tmp_path, Lines(), InProcess())
+    sections, causes, _ = Run(names, setup, tmp_path, Lines(), InProcess()).examined()
     words = verdict.verdict(sections, len(EXPERIMENTS), causes)
     report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
     files.write(tmp_path, report)

@@ -146,7 +146,7 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
     setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
-    sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
+    sections, causes, skipped = experiment.Run(names, setup, tmp_path, Terminal(), Writing(log)).examined()
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),
         ("rows", "trajectory"), ("figures", "trajectory"), ("rows", "speed"), ("rows", "derivatives"),

@@ -1,8 +1,9 @@
-"""Conventions in which right equations look different: order, senses, zeros and units of the joints, angles from
-the world, quaternions, axes of velocities.
+"""Conventions in which right equations look different.
+
+Order, senses, zeros and units of joints, angles from the world, quaternions, axes of velocities.
 
 A convention says at which state of the model the equations are, and how the user's speeds become the model's:
-qd = S v, so that M = S' Mbar S and h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is one function in KINDS.
+qd = S v. M = S' Mbar S, h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is a function in KINDS.
 """
 
 import re
@@ -83,7 +84,8 @@ def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[nda
 
 
 def stated(
-    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint], rank: int = 1
+    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint],
+    rank: int = 1,
 ) -> Convention:  # fmt: skip
     """A convention that can be stated by the joints."""
     joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
@@ -133,7 +135,7 @@ def orders(equations: Equations) -> Iterator[Convention]:
 
 
 def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
-    """Orders in which programs count joints: breadth first, alphabetical, sides exchanged, reversed; two exchanged."""
+    """Orders in which programs count joints: breadth first, alphabetical, by sides, reversed; two swapped."""
     names = list(tree.joint_names)
     depth = {name: len(tree.path(i)) for i, name in enumerate(names)}
     by_depth = sorted(names, key=depth.__getitem__), sorted(names, key=lambda name: (depth[name], name))
@@ -166,7 +168,7 @@ def units(equations: Equations) -> Iterator[Convention]:
 
 
 def from_the_world(equations: Equations) -> Iterator[Convention]:
-    """Angles measured from the world instead of from the body before, of any of the hinges with parallel axes."""
+    """Angles measured from the world, not from the body before, of any of the hinges with parallel axes."""
     tree, joints = equations.tree, equations.tree.coordinates.joints
     before = {i: hinge_before(tree, i) for i, kind in enumerate(tree.kind) if kind == "hinge"}
     at_q, at_v = ([getattr(joints[i], name).start for i in before] for name in ("q", "qd"))
@@ -193,7 +195,7 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
 
 
 def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
-    """The hinge that carries hinge i and is parallel to it, and the cosine of their axes; -1: there is none."""
+    """The hinge that carries hinge i and is parallel to it, or -1, and the cosine of their axes."""
     hinges = (k for k in tree.path(tree.parent[i]) if tree.kind[k] != "slide")
     parent = next(hinges, -1)
     if parent < 0 or tree.kind[parent] != "hinge":

@@ -1,6 +1,6 @@
 """Numbers of a model exchanged, negated, left out or in another unit: several that one slip changes together.
 
-Each kind is one function in KINDS, which yields the place, what it explains, and the fields of the tree that differ.
+Each kind is a function in KINDS. It yields the place, what it explains, and the Tree's fields that differ.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -221,7 +221,7 @@ def axes(equations: Equations) -> Iterator[Edit]:
 
 
 def turns(equations: Equations) -> Iterator[Edit]:
-    """The fixed turn of a body in the body before (euler, rpy): left out, transposed, in another order; or of all."""
+    """The fixed turn (euler, rpy) of a body, or all of them: left out, transposed, in another order."""
     tree, before = equations.tree, [equations.axes_at(parent) for parent in equations.tree.parent]
     ways: dict[str, Way] = {
         "left out": lambda turn: turn @ turn.T,

@@ -1,4 +1,4 @@
-"""Given values of Mbar and h in a layout that has their parts, with the tolerances of their own scale; where they differ."""
+"""Given values of Mbar and h with their parts, and tolerances of their own scale; where they differ."""
 
 from collections.abc import Callable
 
@@ -20,8 +20,9 @@ class Given:
     """Values of Mbar and h, in a layout that has their parts, beside the right ones at the same states."""
 
     def __init__(
-        self, tree: Tree, values: Values, bias: Bias | None, mass_matrix: Callable[[ndarray], ndarray] | None = None,
-        rest: ndarray | None = None, qdd: ndarray | None = None,
+        self, tree: Tree, values: Values, bias: Bias | None,
+        mass_matrix: Callable[[ndarray], ndarray] | None = None, rest: ndarray | None = None,
+        qdd: ndarray | None = None,
     ):  # fmt: skip
         self.tree, self.values, self.bias, self.mass_matrix = tree, values, bias, mass_matrix
         M, h, nv = values.mass_matrix, values.bias, len(tree.axis)
@@ -43,7 +44,7 @@ class Given:
 
     @property
     def own_scale(self) -> ndarray:
-        """The size of each entry at a state, by its largest value at all states: large values are rounded too."""
+        """The size of each entry at a state, by its largest value at all: large values are rounded too."""
         speed = 1.0 + np.abs(self.values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
         of_state, start = np.ones_like(self.packed), self.layout.in_h.start
         of_state[:, start : start + self.layout.nv] = speed
@@ -63,7 +64,7 @@ class Given:
         return Given(self.tree, values, None, None, None if self.rest is None else rest)
 
     def details(self) -> tuple[Detail, ...]:
-        """Entries of Mbar, gravity and coefficients of h that differ, where both numbers are furthest apart."""
+        """Entries of Mbar, gravity and coefficients of h that differ, where they are furthest apart."""
         equations, details = self.equations, []
         right, of_M = equations.coefficients, equations.entries[equations.in_M]
         tolerances = dict.fromkeys(right, SUMMED * self.tolerance[:, equations.in_h].max(axis=1))

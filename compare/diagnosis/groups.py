@@ -22,7 +22,7 @@ OF_BODY = 10  # mass, its product with the CoM, tensor about the origin of the f
 
 
 def body_columns(equations: Equations) -> ndarray:
-    """What a unit of each of the ten numbers of each body adds to the values, (bodies, 10, states, entries)."""
+    """What a unit of each body's ten numbers adds to the values, (bodies, 10, states, entries)."""
     changes: dict[Path, ndarray] = {}
     stated, shape = equations.stated, (len(equations.tree.mass), 1 + OF_BODY)
     for b, k in np.ndindex(shape):  # the last is the base: the mass is larger by 1, and the others stay
@@ -92,7 +92,7 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
 
 
 def turned(equations: Equations, search: Search) -> Iterator[Cause]:
-    """The tensor of a body about other axes, with the same principal moments: the turn of an inertial frame."""
+    """The tensor of a body about other axes, with the same principal moments: an inertial frame turned."""
     for b, columns in enumerate(body_columns(equations)[:, -6:]):
         added, determined = fit(search, columns)
         axes, stated = equations.frame_of(b).axes, equations.stated["inertia"][b]

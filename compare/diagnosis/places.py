@@ -97,7 +97,7 @@ def is_common(factor: float) -> bool:
 
 
 def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
-    """Damping, stiffness, rest of the spring, friction, a constant force of each joint; damping of all together."""
+    """Damping, spring, friction and a constant force of each joint, and damping of all together."""
     names = Coordinates(tree.joint_names, tree.kind).speeds
 
     def place(name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0) -> Place:
@@ -134,7 +134,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
         name: str, unit: str, size: float, path: Path, along: np.ndarray = ONE,
         origin: np.ndarray | float = 0.0, least: float = -np.inf,
     ) -> Place:  # fmt: skip
-        """A number, or the component of a vector or tensor along an axis, or the product of two, of the file's frame."""
+        """A number, or a component of a vector or tensor along an axis, or the product of two, of a frame."""
         now = float((along * (stated[path.field][path.at] - origin)).sum() / (along * along).sum())
         moves = [(Path(path.field, (*path.at, *at)), float(x)) for at, x in np.ndenumerate(along) if x]
         now = 0.0 if abs(now) < WHOLE * size else now
@@ -180,7 +180,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
 
 
 def tied(equations: Equations) -> Iterator[Place]:
-    """The same number of bodies or joints that are alike, such as a left and a right one, changed together."""
+    """The same number of bodies or joints that are alike, as a left and a right one, changed together."""
     every = [place for place in numbers(equations) if place.kind == "number" and place.is_quadratic]
     for names in alike(equations.tree):
         of_each = [[place for place in every if place.name.endswith(f" of {name}")] for name in names]

@@ -1,4 +1,4 @@
-"""The search for causes of given values of Mbar and h: everything alone, in parts, with a convention, in pairs."""
+"""The search for causes of given values of Mbar and h: alone, in parts, with a convention, in pairs."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -103,7 +103,7 @@ class Explanations:
     # stages
 
     def stages(self) -> Iterator[list[Cause]]:
-        """Explanations of everything: of each stage those that are natural, if there are any; then the others.
+        """Explanations of everything: the natural ones of each stage, if there are any; then the others.
 
         One number with many digits is simpler than two causes.
         """
@@ -161,7 +161,7 @@ class Explanations:
                 yield together([one[0], two[0]], 0.0)
 
     def independent(self, parts: Sequence[str]) -> list[str]:
-        """The parts without velocity terms that differ because the given Mbar does, from which they follow."""
+        """The parts without velocity terms that follow from a given Mbar that differs."""
         is_left_out = {"velocity terms", "M"} <= set(self.differing) and self.h_follows_from_M
         return [name for name in parts if not (is_left_out and name == "velocity terms")]
 
@@ -217,7 +217,7 @@ class Explanations:
         yield from self.with_slips()
 
     def with_slips(self) -> Iterator[Cause]:
-        """An edit or a slip beside a number, a term or another slip, whose changes of the values are added."""
+        """An edit or a slip beside a number, a term or another slip; their changes are added."""
         variants, search = self.all_variants, self.search
         moved = np.stack([((values - search.right) * search.weight).ravel() for _, values in variants])
         left = search.off.ravel() - moved

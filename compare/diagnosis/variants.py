@@ -202,7 +202,8 @@ def factors_of(hinge: str) -> dict[str, tuple[str, ...]]:
     """What a product may have of a hinge, and what is taken for it."""
     sine, cosine = f"sin({hinge})", f"cos({hinge})"
     return {
-        "": (), sine: (cosine, ""), cosine: (sine, ""), f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
+        "": (), sine: (cosine, ""), cosine: (sine, ""),
+        f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
         f"{sine}^2": (f"{cosine}^2", sine, ""), f"{cosine}^2": (f"{sine}^2", cosine, ""),
     }  # fmt: skip
 

@@ -49,17 +49,12 @@ def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **mo
 
 
 def not_chosen(chosen: str) -> set[str]:
-    """The engines that read files and are not chosen, by names with commas. Refused: a name is none of these."""
+    """The engines that read files and are not chosen, by names. Refused: a name is none of these."""
     known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
     for name in names:
         if name not in (*ALWAYS, *known):
             raise Refused(block("run", "no_engine", name=name, known=known))
     return {*known} - {*names}
-
-
-def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:
-    """The experiments of a run, see Run, one after the other."""
-    return Run(names, setup, *place).examined()
 
 
 @dataclass
@@ -90,6 +85,7 @@ class Run:
         self.early = () if is_large else [name for name in self.order if not self.too_long(name)]
 
     def examined(self) -> Examined:
+        """The experiments, one after the other."""
         (self.folder / "figures").mkdir()
         for name in self.early:
             if begin := functions(name).begin:

@@ -82,7 +82,7 @@ def urgency(cause: Cause) -> tuple[int, bool, float]:
 
 
 def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:
-    """The bodies, by the robot's names, whose mass the compiler takes from geoms: the file states no inertial."""
+    """The bodies, by the robot's names, whose mass is that of geoms: the file states no inertial."""
     source = setup.engines["mujoco"].source if isinstance(setup.engines["mujoco"], Mujoco) else None
     if source is None or source.spec is None:
         return []
@@ -115,7 +115,7 @@ def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
 
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict[str, Any]:
-    """The numbers of a Tree by quantity, per joint, speed, position or body, or one; joints and bodies in this order."""
+    """The numbers of a Tree by quantity, for these joints, their speeds and positions, and bodies."""
     anchors, _, _ = places_of(tree)
     places = [tree.coordinates.joints[j] for j in joints]
     counts = [place.q.stop - place.q.start for place in places]

@@ -1,4 +1,4 @@
-"""One cause for numbers that are wrong together: a common factor, exchanged, the same at several places, a vector."""
+"""One cause for numbers that are wrong together: a factor, exchanged, alike at several places, a vector."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -88,7 +88,7 @@ def common_factor(numbers: Sequence[Compared]) -> float | None:
 
 
 def of_first(numbers: Sequence[Compared]) -> tuple[list[Compared], Cause]:
-    """The first of some numbers with those that are wrong with it, exchanged or changed in the same way; their cause."""
+    """The first of some numbers with those that are exchanged, or wrong in the same way, and their cause."""
     first, *others = numbers
     same = [each for each in others if each.quantity == first.quantity]
     exchanged = [each for each in same if is_near(each.stated, first.compiled)]
@@ -113,7 +113,7 @@ def is_near(values: np.ndarray, others: np.ndarray) -> bool:
 
 
 def values_of(number: Compared) -> dict[str, Any]:
-    """What is said of a vector or a tensor: components that differ, and whether two of a diagonal are exchanged."""
+    """What is said of a vector or tensor: components that differ, whether two of a diagonal are exchanged."""
     names, shown = COMPONENTS[len(number.stated)], np.arange(len(number.stated))
     is_tensor = len(names) == 9
     if is_tensor:

@@ -68,7 +68,7 @@ class FeatureRow(Row):
 
 
 class Compared(NamedTuple):
-    """A number, vector or tensor of a body or a joint, and its causes, one for each component that differs."""
+    """A number, vector or tensor of a body or joint, and its causes, one for each component that differs."""
 
     place: str
     quantity: str
@@ -100,7 +100,7 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
 def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> Compared:
     """Add the check of a number of a body or joint.
 
-    words: for whole numbers. Rank 1: an option, or a convention of a joint (order, sign, zero); 2: one number.
+    words: for whole numbers. Rank 1: an option or a convention of a joint (order, sign, zero); 2: one number.
     """
     quantity, tolerance = number.quantity, number.tolerance
     stated, compiled = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
@@ -161,7 +161,7 @@ class Touch(NamedTuple):
 
 
 def touches(setup: Setup, dynamics: MujocoDynamics) -> list[Touch]:
-    """The pairs of geoms that touch, each where it first does: in a scene as MuJoCo runs it, at a random state."""
+    """The pairs of geoms that touch, each where it first does: in a scene by MuJoCo, at a random state."""
     if not dynamics.may_touch:
         return []
     found: dict[tuple[str, str], Touch] = {}

@@ -67,7 +67,7 @@ def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
 
 
 def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
-    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding: half an eps a step."""
+    """MuJoCo's integrators and the same schemes in tmt make the same error, up to half an eps a step."""
     by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
     for run in scene.runs:
         mujoco, twin = run.row, by_tmt.get((run.method.scheme, run.row.dt))
@@ -195,10 +195,7 @@ def reaching(rows: Sequence[SpeedRow], target: float) -> list[SpeedRow]:
 
 
 def cheapest_settings(result: SpeedResult) -> dict[str, Any]:
-    """For TARGET where errors are regular: the cheapest of all engines, and of MuJoCo, or of tmt beside MuJoCo's.
-
-    With them what the sentences about them say of the run.
-    """
+    """For TARGET where errors are regular: the cheapest of all engines and of MuJoCo (else tmt)."""
     reach = reaching([row for row in result.rows if row.scene == result.regular], TARGET)
     first = cheapest(reach)
     other = "tmt" if first and first.engine == "mujoco" else "mujoco"
