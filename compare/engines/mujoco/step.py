@@ -88,10 +88,11 @@ class Step:
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
         """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`.
 
-        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4 nor the ends of a range of activations.
+        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4, delays nor the ends of a range of activations.
         """
         sides, columns = self.sides(state, nudge), list[np.ndarray]()
-        if self.integrator != "RK4" and all(ahead.any() and behind.any() for ahead, behind in sides):
+        has_function = self.integrator != "RK4" and not getattr(self.model, "nhistory", 0)
+        if has_function and all(ahead.any() and behind.any() for ahead, behind in sides):
             A = np.zeros((self.size, self.size))
             self.put(state)
             mujoco.mjd_transitionFD(self.model, self.data, nudge, True, A, None, None, None)
