@@ -147,10 +147,12 @@ class Quantity(NamedTuple):
             a = accelerations(subject)[k]
             yield Way(BY_INVERSE, False, lambda eps: of_inverse(dynamics, q, qd, a, eps))
         functions = {TRANSITION: of_transition, BY_STEPS: of_steps}
+        if self.integrator == "RK4" or getattr(dynamics.model, "nhistory", 0):  # of delays
+            del functions[TRANSITION]
         for (side, centred), (name, function) in product(
             ((ONE_SIDED, False), (CENTRED, True)), functions.items()
         ):
-            if self.integrator and not (self.integrator == "RK4" and function is of_transition):
+            if self.integrator:
 
                 def call(
                     eps: float, function: Callable[..., Call] = function, centred: bool = centred
