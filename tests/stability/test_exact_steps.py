@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, sphere
@@ -71,6 +72,13 @@ def test_limits_of_one_hinge_are_those_of_the_formula():
     exactly = filtered.replace('"filter"', '"filterexact"')
     assert limit_of(hinge(actuator=exactly), "implicitfast").kind == "finite"
     assert limit_of(hinge(actuator=exactly), "implicitfast").dt > 0.05
+
+
+@pytest.mark.skipif(not hasattr(mujoco.MjModel, "nhistory"), reason="this MuJoCo knows no delays")
+def test_a_delay_of_constant_controls_changes_no_limit():
+    servo = '<position joint="turn" kp="20" kv="1"{}/>'
+    prompt, late = (hinge(actuator=servo.format(more)) for more in ("", ' delay="0.004" nsample="4"'))
+    assert limit_of(late, "implicitfast").dt == pytest.approx(limit_of(prompt, "implicitfast").dt)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -122,9 +122,33 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
     assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192]
     assert runs.step_counts(fine, (1, 2)) == [8193]
-    assert runs.steps_afforded(case) == 2_700_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
+    assert runs.steps_afforded(40) == 2_700_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
     counts = [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)]
     assert counts == [5, 65, 65, 64]
+
+
+LIGHT = """<mujoco><worldbody><body><joint name="arm" axis="0 1 0" damping="0.1"/><geom size="0.1" pos="0.3 0 0"/>
+<body pos="0.3 0 0"><joint name="light" axis="0 1 0" damping="1"/>
+<inertial pos="0 0 0" mass="0.001" diaginertia="1e-5 1e-5 1e-5"/></body></body></worldbody></mujoco>"""
+
+
+def test_a_scheme_that_does_not_bear_the_step_of_a_file_is_compared_in_the_beginning(tmp_path):
+    """RK4, of a joint that decays at 1e5 per s; the others have its damping implicit. A user's own scene stays as it is."""
+    setup = setup_of_file(LIGHT)
+    case = setup.robot.case("c", duration=1.0, dt=1 / 64, tags=("own",))
+    result, stated = (runs.follow(each, setup.engines, (1,)) for each in (case, case.changed(tags=("user",))))
+    assert {check.passed for check in result.checks} == {True} and False in {
+        check.judged for check in stated.checks
+    }
+    for row in result.rows:
+        steps = 1 / 64 if row.engine_integrator != "RK4" else pytest.approx(1e-5, rel=0.01)
+        assert (row.dt, row.judged_until) == (
+            steps,
+            64 * steps if row.dt == 1 / 64 else pytest.approx(64 * row.dt),
+        )
+    assert {run.scheme for run in result.runs} == {"semi_implicit_euler", "implicit"}
+    (told,) = [note.values["runs"][0] for note in result.notes]
+    assert told["integrators"] == ["RK4"] and told["end"] == pytest.approx(64 * told["dt"])
 
 
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
