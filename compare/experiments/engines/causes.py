@@ -432,7 +432,7 @@ OF_ENGINES: Mapping[str, Sequence[str]] = {
               "mass_of_meshes", "several_joints"),
     "pinocchio": ("joint_pos_of_class", "armature_of_actuator", "option_gravity", "gravity_flag", "total_mass", "bounds",
                   "groups", "geom_mass_of_class", "geoms_without_contacts", "fixed_root", "frame", "other_roots",
-                  FLOAT32, "oblique_turn", "mass_of_meshes", "turned_start"),
+                  "oblique_turn", "mass_of_meshes", "turned_start"),
     "newton": ("armature_of_actuator", "passive_of_free", "option_gravity", "total_mass", "shell_inertia", "replicate",
                "small_inertia", "mass_of_meshes", "several_joints"),
 }  # fmt: skip
