@@ -131,7 +131,7 @@ def aligns(joint: mujoco.MjsJoint) -> bool:
 
 
 def has_transition(m: mujoco.MjModel, integrator: str) -> bool:
-    """Whether mjd_transitionFD differentiates its step; nhistory: numbers that delays keep (MuJoCo >= 3.12)."""
+    """Whether mjd_transitionFD differentiates its step; nhistory: numbers that delays keep."""
     return integrator != "RK4" and not getattr(m, "nhistory", 0)
 
 
