@@ -21,6 +21,7 @@ from .scene import Scene
 Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
+MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time where it is compared
 COARSER = 4  # largest step / step of the file
 OWN_POSTURES = "qpos0", "middle"  # their names
 SAME_POSTURE = 1e-9  # rad or m
@@ -198,14 +199,19 @@ def coarsest(
 ) -> int:
     """The number of steps of a scene, 64, 128 ... 8192: about four times the step of the file.
 
-    No step is longer than 1 / the fastest rate of damping, added damping, springs and servos. inverse: of
-    Mbar, (nv, nv).
+    No step is longer than 1 / the fastest rate of damping, added damping, springs and servos, unless that
+    were more steps than are afforded. inverse: of Mbar, (nv, nv).
     """
     least = duration * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
-    count = MIN_STEPS
-    while count < min(0.999 * least, MAX_STEPS_OF_A_FILE):
+    count, most = MIN_STEPS, min(MAX_STEPS_OF_A_FILE, steps_afforded(len(inverse)))
+    while count < 0.999 * least and 2 * count <= most:
         count *= 2
     return count
+
+
+def steps_afforded(nv: int) -> int:
+    """The steps of a run that is compared to its end: each has a Jacobian of (2 nv)^2 entries."""
+    return MOST_ENTRIES // (2 * nv) ** 2
 
 
 def thrown(tree: Tree) -> tuple[float, ...]:

@@ -26,6 +26,19 @@ DRAWN = "skins", "lights", "cameras", "textures"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 
 
+def spec_with_points(source: Source, points: Iterable[str]) -> mujoco.MjSpec:
+    """A copy of the file's spec with sites at bodies with these names. ValueError for a name that no body or site has."""
+    assert source.spec is not None
+    spec = source.spec.copy()
+    sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
+    for name in points:
+        if name not in sites | bodies:
+            raise ValueError(f"the file has no body and no site {name!r}")
+        if name not in sites:
+            spec.body(name).add_site(name=name)
+    return spec
+
+
 class Smaller:
     """A spec, all of whose elements have names, and its compiled model."""
 
@@ -36,15 +49,8 @@ class Smaller:
 
     @classmethod
     def whole(cls, source: Source, points: tuple[str, ...] = ()) -> "Smaller":
-        """The whole file. points: names of sites, or of bodies, which get one; else ValueError."""
-        assert source.spec is not None
-        spec = source.spec.copy()
-        sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
-        for name in points:
-            if name not in sites | bodies:
-                raise ValueError(f"the file has no body and no site {name!r}")
-            if name not in sites:
-                spec.body(name).add_site(name=name)
+        """The whole file. points: see spec_with_points."""
+        spec = spec_with_points(source, points)
         first = cls(spec)
         for elements, kind in NAMED.items():
             for element in getattr(spec, elements):

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Drive
-from .names import INTEGRATORS, bit, element_name, number_of_actuators, output_of, set_control
+from .names import INTEGRATORS, bit, element_name, has_transition, number_of_actuators, output_of, set_control
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
@@ -89,11 +89,12 @@ class Step:
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
         """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`.
 
-        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4 nor the ends of a range of
+        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4, delays nor the ends of a range of
         activations.
         """
         sides, columns = self.sides(state, nudge), list[np.ndarray]()
-        if self.integrator != "RK4" and all(ahead.any() and behind.any() for ahead, behind in sides):
+        has_function = has_transition(self.model, self.integrator)
+        if has_function and all(ahead.any() and behind.any() for ahead, behind in sides):
             A = np.zeros((self.size, self.size))
             self.put(state)
             mujoco.mjd_transitionFD(self.model, self.data, nudge, True, A, None, None, None)

@@ -22,6 +22,7 @@ from .sub_blocks import compare_blocks
 EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
+    first_screen=("answer",),
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
 )
 
@@ -79,9 +80,11 @@ def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
         result.tables.setdefault("reduction_needs", []).extend(rows)
         groups.setdefault((names, case.scene.locked, need.stays), []).append(case)
     for numbers, cases in sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2])):
-        values: dict[str, Any] = dict(zip(("needed", "locked", "stays"), numbers))
-        values |= {"about": claim_values(cases[0].robot), "scenes": [case.name for case in cases]}
-        result.top.append(result.finding("answer", **values))
+        about, scenes = claim_values(cases[0].robot), [case.name for case in cases]
+        moving, locked, stays = numbers
+        result.top.append(
+            result.finding("answer", scenes=scenes, needed=moving, locked=locked, stays=stays, about=about)
+        )
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:

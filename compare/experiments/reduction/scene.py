@@ -79,8 +79,6 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     points = tuple(request.points.split(",")) if request.points else ()
     whole = Smaller.whole(reading.source, points)
     cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
-    if cases and request.controls:
-        raise ValueError("--controls and --scenes both say what the robot does")
     motions = [motion_of_case(case, reading, whole) for case in cases]
     scene = Scene(reading, motions or [motion_of_posture(setup, reading, whole)], whole, points)
     paths = scene.run(whole)

@@ -22,7 +22,7 @@ EDITS = (
     ("mujoco.locked", "compiled_without", "not bare and _1", "False", "neighbours touch where joints are locked"),
     ("parameters.contacts", "touches", "not dynamics.may_touch", "True", "nothing touches"),
     ("parameters.common", "common_factor", "is_common and _1", "_1", "any factor is a common one"),
-    ("parameters.common", "alike", "is_near(_1, first.stated) and is_near(_2, first.compiled)", "True",
+    ("parameters.common", "of_first", "(each for each in alike if is_near(*_1))", "same",
      "all wrong numbers are one cause"),
     ("parameters", "beside_stated", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     ("parameters", "rows", "sorted(result.causes, key=_1)", "result.causes", "causes in the order of finding"),
