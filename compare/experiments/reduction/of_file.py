@@ -55,13 +55,14 @@ def add(result: Result, setup: Setup, reading: Reading) -> None:
     candidate = next(candidate for candidate in candidates if candidate.row is row)
     locked = locks.positions(candidate.groups)
     small = finished(candidate.small, scene.motions, row.dt, row.integrator)
+    stay = {actuator.name for actuator in small.spec.actuators}
     facts = {
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
         "scene": {"name": scene.name, "duration": scene.duration},
         "names": list(locked),
-        "actuators": actuators_gone(scene.whole, small),
+        "actuators": [each.name for each in scene.whole.spec.actuators if each.name not in stay],
         "of_actuators": number_of_actuators(scene.whole.model),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
@@ -113,12 +114,6 @@ def add_tables(
     result.tables["reduction_joints"] = sorted(joints.values(), key=lambda joint: joint.moved)
     pairs = near(scene.whole.model, scene.positions(scene.whole), use.pairs)
     result.tables["reduction_near"] = [PairRow(*pair, distance) for pair, distance in pairs.items()]
-
-
-def actuators_gone(whole: Smaller, small: Smaller) -> list[str]:
-    """Those of locked joints, and those without force."""
-    names = {actuator.name for actuator in small.spec.actuators}
-    return [actuator.name for actuator in whole.spec.actuators if actuator.name not in names]
 
 
 def use_of(scene: Scene) -> list[UseRow]:
