@@ -59,11 +59,12 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
     through M.
     """
     model, use, places = free.model, scene.use, joints(free.model)
-    slides = {name for number, name in enumerate(places) if kind_of(model, number) == "slide"}
+    slides = [name for number, name in enumerate(places) if kind_of(model, number) == "slide"]
+    most = dict.fromkeys(places, DOES) | dict.fromkeys(slides, DOES_SLIDE)
     costs = couplings(model, scene.positions(free), np.hstack([use.middle[name] for name in places]))
     groups = []
     for names in tied_joints(model):
-        if all(use.ranges[name] <= (DOES_SLIDE if name in slides else DOES) for name in names):
+        if all(use.ranges[name] <= most[name] for name in names):
             speeds = np.r_[tuple(places[name][1] for name in names)]
             others = np.setdiff1d(np.arange(model.nv), speeds)
             groups.append(Group(names, float(costs[np.ix_(others, speeds)].max(initial=0.0))))
