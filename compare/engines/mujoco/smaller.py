@@ -208,7 +208,7 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
     numbers = {number for number, name in enumerate(joints(model)) if name in positions}
     tied = [tendon for tendon in range(model.ntendon) if numbers.intersection(joints_of(model, tendon))]
     gone = {element_name(model, "tendon", tendon) for tendon in tied}
-    delete_named(spec, [tendon for tendon in spec.tendons if tendon.name in gone])
+    delete_named(spec, "tendon", [tendon for tendon in spec.tendons if tendon.name in gone])
     with warnings.catch_warnings(action="ignore"):
         fixed = compiled_without(spec, of_parts(model, positions), bare=False)
     for tie in list(spec.equalities):
