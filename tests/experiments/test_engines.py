@@ -17,6 +17,7 @@ from trees import tree_of_kinds
 from compare import engines
 from compare.core.check import About, Result
 from compare.engines import EngineRecord
+from compare.engines.outside import OutsideDynamics
 from compare.engines.outside.bodies import Body, combined, links_of, numbers_of, size_of
 from compare.engines.outside.file import File
 from compare.engines.outside.model import FROM_FILE, ReadModel
@@ -315,3 +316,10 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     assert integrators.order_of(steps, errors, 1e-2) is None
     finer = [2.0**-k for k in range(7, 14)]
     assert integrators.order_of(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
+
+
+def test_damping_that_acts_is_what_was_read_where_nothing_is_set():
+    for is_set, damping in ((True, 0.1), (False, 0.5)):
+        of = OutsideDynamics("none", ARM.case(damping=0.1), is_set)
+        vars(of)["reading"] = {"read": {"damping": np.full(3, 0.5)}, "lacking": ("stiffness",)}
+        assert of.acting.damping == (damping,) * 3
