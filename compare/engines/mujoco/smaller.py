@@ -96,9 +96,8 @@ def drawing(small: Smaller, use: Use) -> int:
     """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, meshes."""
     for material in small.spec.materials:
         material.textures = [""] * len(material.textures)
-    return touchless(small, lambda geom: not (geom.contype or geom.conaffinity)) + sum(
-        small.delete(elements, lambda _: True) for elements in DRAWN
-    )
+    count = touchless(small, lambda geom: not (geom.contype or geom.conaffinity))
+    return count + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
 
 
 def touchless(small: Smaller, is_needless: Callable[[mujoco.MjsGeom], bool]) -> int:
@@ -128,13 +127,12 @@ def tendons(small: Smaller, use: Use) -> int:
 
 def limits(small: Smaller, use: Use) -> int:
     """Limits of joints and tendons that never act; their ranges stay, as a servo may have the same."""
-    count = 0
-    for elements, kind in (("joints", "joint"), ("tendons", "tendon")):
-        limited = getattr(small.model, "jnt_limited" if kind == "joint" else "tendon_limited")
-        for element in getattr(small.spec, elements):
-            if limited[element.id] and element.name not in use.acted[kind]:
-                element.limited, count = OFF, count + 1
-    return count
+    model, acted = small.model, use.acted
+    ends = [x for x in small.spec.joints if model.jnt_limited[x.id] and x.name not in acted["joint"]]
+    ends += [x for x in small.spec.tendons if model.tendon_limited[x.id] and x.name not in acted["tendon"]]
+    for element in ends:
+        element.limited = OFF
+    return len(ends)
 
 
 def stages(small: Smaller, use: Use) -> int:

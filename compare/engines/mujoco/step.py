@@ -138,7 +138,7 @@ class Step:
         speed = self.data.actuator_velocity
         return np.array([servo.force(length[servo.output], speed[servo.output]) for servo in servos])
 
-    def by_control(self, state: np.ndarray, controls: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
+    def by_control(self, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
         """The derivative of a step by some of the controls, (n, k)."""
 
         def pushed(control: int, by: float) -> np.ndarray:
@@ -146,7 +146,7 @@ class Step:
             self.data.ctrl[control] += by
             return self.after(self.state())
 
-        columns = [(pushed(k, nudge) - pushed(k, -nudge)) / (2.0 * nudge) for k in controls.tolist()]
+        columns = [(pushed(k, NUDGE) - pushed(k, -NUDGE)) / (2.0 * NUDGE) for k in controls.tolist()]
         return np.array(columns).reshape(-1, self.size).T
 
     def run(self, state: np.ndarray, steps: int, act: Act = lambda step: None) -> Iterator[mujoco.MjData]:
@@ -219,13 +219,9 @@ def whole_run(
 
 
 def start_of(
-    model: mujoco.MjModel,
-    drive: Drive,
-    key: str,
-    push: np.ndarray,
-    q: np.ndarray | None = None,
+    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None,
     controls: Sequence[float | None] = (),
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) added to its speeds.
 
     q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.
