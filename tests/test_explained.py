@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from in_process import Lines
 from sections import BAD, section
-from small_runs import Lines
 from test_own_reference import IDLE, examined
 from test_own_reference import folder as folder
 

@@ -1,4 +1,4 @@
-"""The parts of the project, the directions of their imports, and the types that may be anything."""
+"""The parts of the project, and the directions of their imports."""
 
 import ast
 import re
@@ -25,11 +25,6 @@ LIBRARIES = {
 SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup"))
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
-# parameters and fields that have a class of this project, or one of its engines' or libraries'
-OURS = {
-    "case", "drawn", "engine", "figure", "model", "one", "reading", "reference", "report", "result", "robot",
-    "section", "setup", "tree",
-}  # fmt: skip
 
 
 def dotted(path) -> str:
@@ -107,25 +102,6 @@ def test_there_is_no_circle():
     for importing, imported in pairs - FOR_DOCSTRINGS:
         graph.add(importing, imported)
     graph.prepare()
-
-
-def annotations(path):
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.arg) and node.annotation:
-            yield node.arg, node.annotation
-        elif isinstance(node, ast.AnnAssign):
-            yield ast.unparse(node.target), node.annotation
-
-
-def test_object_is_the_type_of_nothing_of_the_project():
-    """An import is never avoided by `object` where a class is meant; of a user's values any type is possible."""
-    untyped = set()
-    for path in FILES:
-        for name, annotation in annotations(path):
-            parts = {part.id for part in ast.walk(annotation) if isinstance(part, ast.Name)}
-            if "object" in parts and name in OURS:
-                untyped.add(f"{dotted(path)}: {name}")
-    assert not untyped
 
 
 def test_the_diagram_shows_the_imports_of_all_folders():

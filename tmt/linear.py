@@ -107,6 +107,8 @@ def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = AR
     [-1.2  0.   0. ]
     """
     checked_model(model)
+    if not isinstance(name, str):
+        raise ValueError(f"the name of a site or body is a text, not {shown(name)}")
     speeds = np.zeros(model.coordinates.nv) if qd is None else qd
     pose, jacobian = (answered(f"frame_{part}:{name}", model, q) for part in ("pose", "jacobian"))
     convective = answered(f"frame_convective:{name}", model, q, speeds)

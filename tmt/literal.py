@@ -1,8 +1,7 @@
 """The public functions in the literal form: method.py with NumPy, nothing compiled.
 
-It answers small requests, and says what is wrong with what is given. Comparisons ask for it by name: what the
-functions of the package return is compared with it. Arguments, results and errors are those of the functions
-of the same names in `tmt`.
+It answers small requests, says what is wrong with what is given, and is what other forms are compared with.
+Arguments, results and errors are those of the functions of the same names in `tmt`.
 """
 
 from collections.abc import Callable
@@ -48,7 +47,6 @@ def literal(name: str) -> Callable[..., Any]:
 
 
 def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
-    """The quantity of that full name at states in arrays by name, of which all are checked."""
     checked_model(tree)
     quantity, checked = quantity_of(name), states(tree, **arrays)
     batch = checked[0].shape[:-1]

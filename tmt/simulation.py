@@ -158,7 +158,6 @@ def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance:
 
 
 def singular_in(tree: Tree, q: Array, qd: Array) -> tuple[int, str] | None:
-    """The first of start, last and that before the largest change of rates where Mbar is singular; why."""
     if tree.never_singular:
         return None
     alive = int(np.isfinite(q[:, 0]).sum())

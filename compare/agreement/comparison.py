@@ -70,8 +70,8 @@ class Comparison:
     """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`."""
 
     def __init__(
-        self, mjcf: Any, quantities: Mapping[str, Any], q: Any, qd: Any, tau: Any, joints: Sequence[str] | None,
-        rtol: float, states: int, seed: int,
+        self, mjcf: Any, quantities: Mapping[str, Any], q: Any, qd: Any, tau: Any,
+        joints: Sequence[str] | None, rtol: float, states: int, seed: int,
     ) -> None:  # fmt: skip
         self.brought = {name: value for name, value in quantities.items() if value is not None}
         if not self.brought:

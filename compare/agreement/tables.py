@@ -1,4 +1,4 @@
-"""What is wrong with a table of values, rather than with equations: a few of its rows, their order, its columns."""
+"""What is wrong with a table of values rather than with equations: some rows, their order, columns."""
 
 from collections.abc import Iterator
 from itertools import product

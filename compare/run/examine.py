@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -143,10 +143,9 @@ class Run:
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
         say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))
-        for text in (
-            section.result.top if len(self.names) > 1 else ()
-        ):  # else they are the last lines of the run
-            self.terminal.say(f"  {say(text)}")
+        if len(self.names) > 1:  # else they are the last lines of the run
+            for text in section.result.top:
+                self.terminal.say(f"  {say(text)}")
 
     def section_of(self, name: str) -> Section:
         """The section of an experiment, which is run for it; of one that raises with the error alone."""
@@ -190,8 +189,8 @@ def section_with(name: str, result: Result, robot: Robot, is_alone: bool = False
     result.headline = result.headline or experiment.headline(result)
     if not is_alone:
         top = [text for text in result.top if text.kind in record.first_screen]
-        notes = [text for text in result.top if text not in top] + result.notes
-        result = replace(result, top=top, notes=notes)
+        result.notes = [text for text in result.top if text not in top] + result.notes
+        result.top = top
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
     return Section(name, title, claim, tolerance, result, record=record)

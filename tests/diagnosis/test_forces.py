@@ -47,17 +47,6 @@ def test_what_acts_besides_is_named(force, rank, place, explains):
     assert cause.explains == (explains if isinstance(explains, str) else pytest.approx(explains))
 
 
-def test_neither_a_damper_nor_friction_below_zero_is_named():
-    assert causes(-0.1 * QD * [0, 1, 0]) == causes(-0.3 * np.sign(QD) * [1, 0, 0]) == ()
-
-
-@pytest.mark.parametrize("share, found", [(0.99, True), (1.01, False)])
-def test_a_cause_leaves_no_more_than_the_tolerance(share, found):
-    acting = 0.1 * QD * [0, 1, 0]
-    acting[3, 0] += share * TOLERANCE
-    assert any(cause.place == "damping of beta" for cause in causes(acting)) is found
-
-
 @pytest.mark.parametrize("share, differs", [(0.95, False), (1.05, True)])
 def test_accelerations_are_off_by_four_times_the_scale_of_a_force(share, differs):
     """They are rounded before Mbar is multiplied by them."""

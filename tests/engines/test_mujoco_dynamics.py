@@ -27,17 +27,6 @@ def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypa
     assert lenient.ended == strict.ended and list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("place, value, last", [((2, 0), 0.2, 2), ((1, 5), np.inf, 1)])
-def test_a_run_is_no_number_from_where_its_clock_stands_or_a_number_is_not_finite(mujoco, place, value, last):
-    dynamics, states, start = mujoco.of(ARM.case()), np.ones((1, 4, 7)), np.zeros((1, 7))
-    states[0, :, 0] = [0.1, 0.2, 0.3, 0.4]
-    states[0][place] = value
-    q, v, ended = dynamics.path(start, states, 0.1)
-    for values in (q, v):
-        assert np.isfinite(values[0]).all(axis=1).tolist() == [k <= last for k in range(5)]
-    assert ended[0].startswith(f"at t = {0.1 * last:g} s: ")
-
-
 def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):
     """And so are what MuJoCo says of its own steps, and the numbers that it compiled."""
     robot = crane(tmp_path)

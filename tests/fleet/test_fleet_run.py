@@ -17,7 +17,7 @@ from compare.fleet.cache import locked, write_whole
 from compare.fleet.command import solution_files
 from compare.fleet.executors import Outcome
 from compare.fleet.models import found_models, place_of_report
-from compare.fleet.run import AHEAD, Run
+from compare.fleet.run import Run
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED, FileRow
 from compare.fleet.task import Compared, FleetOptions
 
@@ -156,11 +156,6 @@ def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(flee
     assert row.verdict == BROKE and "SIGKILL" in row.reason and not row.has_report and not found.of.is_good
     assert (report(tmp_path, "a.xml") / "index.html").read_bytes() == b"all"
     assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"]
-
-
-def test_few_models_are_in_memory_at_a_time(fleet):
-    found = fleet({f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(20)}, answer=agrees)
-    assert found.executor.most == AHEAD * Inside.workers and len(found.rows) == 20
 
 
 def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_matched(fleet, tmp_path):

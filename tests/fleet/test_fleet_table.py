@@ -2,14 +2,12 @@
 
 import csv
 import dataclasses
-import html
 import json
 import random
 import re
 import shutil
 from functools import partial
 from types import SimpleNamespace
-from urllib.parse import unquote
 
 import pytest
 import runs
@@ -73,12 +71,6 @@ def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, n
     assert row.verdict == verdict and named in row.reason and bool(named) == bool(row.reason)
 
 
-def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
-    assert judged(good(0.2), good(3.0), OWN).worst_ratio == 3.0
-    diverged = judged(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
-    assert (diverged.verdict, diverged.worst_ratio) == (DIFFER, 0.2)
-
-
 def limit(dt, stable, integrator="Euler", kind="finite"):
     of_file = {"file_integrator": "Euler", "stable_at_file_dt": stable}
     return SimpleNamespace(integrator=integrator, limit=kind, predicted_dt=dt, **of_file)
@@ -134,18 +126,6 @@ def page_of(rows, **more):
     return table.fleet_page(rows=rows, **given | more)
 
 
-def test_every_name_leads_to_its_report():
-    names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
-             "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
-    text = page_of([row(file=name) for name in names])
-    links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
-    assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
-    for (address, _), name in zip(links, names, strict=True):
-        address = html.unescape(address)
-        assert not set(address) & set("#?\"'<> ") and ":" not in address  # no fragment, no scheme
-        assert unquote(address) == f"{place_of_report(name)}/index.html"
-
-
 def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():
     rows = [ROW, row(stable_at_file_dt=False), FileRow(file="a b.xml", verdict=REFUSED), row(verdict=ITSELF)]
     text = page_of(rows)
@@ -176,6 +156,8 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
 
 
 EXPERIMENTS = "parameters", "mass"
+
+
 RIGHT = """parameters = 4
 [mass]
 Mbar = 1.5

@@ -7,8 +7,8 @@ import pytest
 
 from compare.core import timing
 from compare.core.check import Result
-from compare.core.words import listed, milliseconds, scene_of, some_of
-from compare.judge.agree import agree, closest, worst_of_each
+from compare.core.words import milliseconds, scene_of
+from compare.judge.agree import agree, closest
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 from tmt.exact.many import Pairs
@@ -118,13 +118,6 @@ def test_the_difference_closest_to_its_tolerance(difference, tolerance, place):
     assert closest(np.array(difference), np.array(tolerance)) == (place,)
 
 
-def test_a_scale_of_each_entry_may_be_the_same_for_all_states_or_bodies():
-    differences = -np.arange(12.0).reshape(2, 3, 2)
-    for scale in ([[[1.0, 4.0]]], np.broadcast_to([1.0, 4.0], (5, 3, 2))):
-        assert np.array_equal(worst_of_each(differences, np.array(scale)), [[4.0, 10.0], [1.0, 1.0]])
-    assert np.array_equal(worst_of_each(differences, np.array([2.0, 3.0, 9.0])), [[5.0, 11.0], [2.0, 3.0]])
-
-
 def test_what_is_compared_is_called_in_turns_and_the_first_call_is_not_counted(monkeypatch):
     now, order = [0.0], []
     monkeypatch.setattr(time, "perf_counter", lambda: now[0])
@@ -153,8 +146,3 @@ def test_a_time_near_another_has_as_many_digits_as_tell_them_apart():
     assert milliseconds(limit) == milliseconds(step) == "2 ms"
     assert (milliseconds(limit, step), milliseconds(step, limit)) == ("2.015 ms", "2 ms")
     assert milliseconds(2.2049e-3, step) == "2.2 ms"
-
-
-def test_lists_of_many_words_are_cut():
-    assert [listed([*"abc"[:n]]) for n in range(4)] == ["", "a", "a and b", "a, b and c"]
-    assert some_of([*"abcdefg"]) == "a, b, c, d, e, f and 1 more" and some_of([*"abc"]) == "a, b and c"

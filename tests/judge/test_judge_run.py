@@ -1,7 +1,5 @@
 """When a run has left or diverged, robots too stiff for their step, the order of a method: just inside and just outside."""
 
-import math
-
 import numpy as np
 import pytest
 from judged import BOTH, INSIDE, OUTSIDE, verdicts
@@ -10,19 +8,17 @@ from trees import one_body
 
 import tmt
 from compare.core.check import Result
-from compare.judge.order import ORDER_MARGIN, check_order, measured_order
+from compare.judge.order import ORDER_MARGIN, check_order
 from compare.judge.run import (
     check_movement,
     departure,
     deviation,
     diverged_at,
     leaves_no_digits,
-    movement_unit,
 )
 from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
-from compare.robots.case import Coordinates
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
@@ -44,16 +40,6 @@ def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved)
         kinetic = share * allowed + at_first - gained
         new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(q, case.tree)[0, 0]), 0.0, 0.0])
         assert diverged_at(case, T, np.array([start, q]), np.array([rate, new])) == ends
-
-
-def test_a_run_has_diverged_where_it_is_not_finite():
-    q, qd = np.zeros((3, 3)), np.zeros((3, 3))
-    for values in (q, qd):
-        for wrong in (np.nan, np.inf):
-            values[2, 1] = wrong
-            assert diverged_at(CASES["bent, free"], np.arange(3.0), q, qd) == 2.0
-            assert deviation(q, q[0]) == (np.inf if values is q else 0.0)
-            values[2, 1] = 0.0
 
 
 def test_an_arm_has_left_at_a_tenth_of_a_radian():
@@ -104,15 +90,6 @@ def test_a_servo_gives_no_more_than_it_has_stored(start):
         assert diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends
 
 
-def test_a_quaternion_and_its_negative_are_the_same_turn():
-    coordinates = Coordinates(("head",), ("ball",))
-    q = np.array([(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, -0.049), (1.0, 0.0, 0.0, 0.051)])
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    assert deviation(q[:2], q[0], coordinates) == pytest.approx(2.0 * np.arctan(0.049))
-    assert departure(np.arange(3.0), q, coordinates) == 2.0
-    assert movement_unit(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"
-
-
 @BOTH
 def test_a_rate_that_leaves_no_digits_after_two_steps(share, passes):
     dt = 1.0 / 8192
@@ -126,38 +103,11 @@ def test_a_reference_in_doubles_is_not_asked_of_a_rate_with_which_it_diverges():
     assert leaves_no_digits(ARM) is None and has_no_reference(ARM) is None
 
 
-STEPS = (0.4, 0.2, 0.1, 0.05)
-
-
-def errors(*orders: float) -> list[float]:
-    """Errors that fall by these orders from step to step."""
-    return [*0.5 ** np.cumsum([0.0, *orders])]
-
-
-def test_the_two_finest_of_enough_steps_give_the_order():
-    order, coarse, fine = measured_order(STEPS, errors(1.0, 2.0, 4.0))
-    assert order == pytest.approx(4.0) and (coarse, fine) == STEPS[-2:]
-    assert measured_order(STEPS[:1], [1.0]) is None and measured_order(STEPS[:3], errors(4.0, 4.0), 4) is None
-
-
-@BOTH
-def test_an_order_has_settled_if_the_last_two_differ_by_the_margin(share, passes):
-    falling = errors(4.0, 4.0 + share * ORDER_MARGIN)
-    assert (measured_order(STEPS[:3], falling, 3) is not None) == passes
-    assert measured_order(STEPS[:3], falling, 2)
-
-
 def checked(*order):
     """The check of a measured order."""
     result = Result("test")
     check_order(result, "pendulum", *order)
     return result.checks[0]
-
-
-@pytest.mark.parametrize("error", [math.nan, 0.0])
-def test_an_error_that_is_no_number_or_zero_fails(error):
-    order, *_ = measured_order(STEPS[:2], [1.0, error])
-    assert checked(4, order).failed
 
 
 @BOTH

@@ -1,6 +1,5 @@
 """The files of a report: the first screen of the page, what all files have, what breaks; pictures and provenance."""
 
-import base64
 import json
 import re
 import subprocess
@@ -163,16 +162,6 @@ def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(tmp_path):
     assert paper.sum() > 9999 and (few[paper] == 255).all()
     sizes = [(tmp_path / name).stat().st_size for name in ("few.png", "whole.png")]
     assert sizes == sorted(sizes)
-
-
-@pytest.mark.parametrize("name, kind", [("a.png", "png"), ("a.gif", "gif")])
-def test_a_picture_in_the_page_is_its_file(name, kind, tmp_path):
-    others = [Image.new("L", (3, 2), 200)] * (kind == "gif")
-    Image.new("L", (3, 2)).save(tmp_path / name, save_all=bool(others), append_images=others)
-    address, *size = images.embedded(tmp_path / name)
-    head, data = address.split(",", 1)
-    assert (head, size) == (f"data:image/{kind};base64", [3, 2])
-    assert base64.b64decode(data) == (tmp_path / name).read_bytes()
 
 
 def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):

@@ -74,17 +74,6 @@ def test_report_md_is_short_whatever_there_is_to_say():
         assert all(part in text for part in parts)
 
 
-def test_a_small_report_md_is_whole_and_names_are_no_markup_in_it():
-    of = section("trajectory", GOOD, rows=runs(405), what_should_i_use=[{"b": 1.25, "of": "<script> | b"}])
-    of.result.notes = [*(f"Note {k}." for k in range(11)), "In `<option>`, 1 < 2 and a<b."]
-    text = text_of(of)
-    assert "6 of 405" in text and "| 5 |" in text and "| 6 |" not in text and "| 1.25 |" in text
-    assert all(f"- Note {k}." in text for k in range(11))
-    assert "&lt;script&gt; &#124; b" in text and "**Worst in &lt;i&gt;.**" in text
-    of.result.filed = ("what_should_i_use",)  # in its file alone
-    assert "1.25" not in text_of(of) and "(tables/what_should_i_use.csv)" in text_of(of)
-
-
 MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"])
 ATTACK = "<img src=x onerror=document.documentElement.id='run'>"
 NAMES = [f"`{ATTACK}``", "*/ [x](http://x.y) | a | __b__ &lt; \\", '=$\\frac{1}$"""']

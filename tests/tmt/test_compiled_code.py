@@ -2,7 +2,6 @@
 
 import ctypes
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import mpmath
@@ -17,7 +16,7 @@ from tmt import literal
 from tmt.compiled import Evaluator, forms, runner, runs, straight
 from tmt.compiled.ir import POINTER, Code, module
 from tmt.compiled.machine import Library
-from tmt.compiled.runner import Runner, runner_of, runners
+from tmt.compiled.runner import Runner
 from tmt.compiled.straight import LIMIT, functions, trace
 from tmt.derivation.dual import jacobian
 from tmt.derivation.vectors import cos, sin
@@ -165,30 +164,3 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
         three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three)) and one.ended[40]
         assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended)
-
-
-def test_threads_ask_at_once_for_what_is_not_compiled(folder, monkeypatch):
-    monkeypatch.setattr(runner, "MOST", 1)  # of trees and methods the last ones are held
-    tree = tmt.ARM.lock({"alpha": 0.1, "gamma": 0.25})
-    q = np.random.default_rng(0).uniform(-1, 1, (9, 1))
-    with ThreadPoolExecutor(4) as pool:
-        starts = [[q[k % 2 :]] * 3 for k in range(8)]
-        runs = [pool.submit(tmt.simulate, *start, 0.01, 3, model=tree) for start in starts]
-        paths = [run.result().q for run in runs]
-    assert all(np.array_equal(path, paths[k % 2]) for k, path in enumerate(paths))
-    assert np.array_equal(paths[0][1:], paths[1]) and len(runners) == 1
-
-
-def test_a_call_that_is_made_once_fills_its_paths_each_time():
-    q, qd, tau = starts(2)
-    qd[1] = 1e200
-    wanted = tmt.simulate(q, qd, tau, 0.1, 6, "dopri8_adaptive", SMALL, tolerance=1e-6)
-    arrays = *paths_from(q, qd, 6), tau, np.zeros((2, 3), np.int64)
-    compiled = runner_of(SMALL, "dopri8_adaptive")
-    call = compiled.call(1, arrays, 0.1, 1e-6)
-    for _ in range(2):
-        call()
-        codes, evaluations = compiled.outcome(*arrays[:2], arrays[3])
-        assert evaluations == wanted.evaluations and codes[0].tolist() == [0, 0] and codes[1, 0] > 0
-        assert all(np.array_equal(*pair, equal_nan=True) for pair in zip(arrays, wanted[1:]))
-        arrays[0][:, 1:] = np.nan

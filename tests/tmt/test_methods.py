@@ -2,21 +2,18 @@
 
 import dataclasses
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
-from trees import random_state, random_states, small_tree, tree_of_kinds
+from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt.compiled import forms, runner_of
+from tmt.compiled import forms
 from tmt.derivation import method
 from tmt.exact.motion import trajectory
 from tmt.methods import (
     METHODS,
     RungeKutta,
-    SemiImplicitEuler,
-    amplification,
     derivatives,
     dop853,
     method_named,
@@ -27,10 +24,6 @@ from tmt.methods.stepping import Method, advance
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 EPS = np.finfo(float).eps
-FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
-ORDERS = {name: METHODS[name].order for name in FIXED}
-ORDERS["rk4_mean_speed"] = 4  # of hinges; with balls see below
-SMALL = small_tree()
 
 
 def test_the_coefficients_of_dop853_are_those_of_scipy():
@@ -39,25 +32,6 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
     assert np.array_equal([*dop853.ERRORS[0], 0.0], DOP853.E5)  # with one of the slope at the end of the step
     assert np.array_equal([*dop853.ERRORS[1], 0.0], DOP853.E3)
-
-
-@pytest.mark.parametrize("name", FIXED)
-def test_order(name):
-    """One step against two halves: what they differ by falls with dt to the power of order + 1."""
-    implicit = METHODS[name].solves_stages  # those take long in many digits: doubles, at larger steps
-    number, large = (float, 0.04) if implicit else (mpmath.mpf, mpmath.mpf("0.01"))
-    rest, start = [number(0)] * 3, [number(float(a)) for a in BENT]
-
-    def after(steps, duration):
-        state = start, rest
-        for _ in range(steps):
-            state = one_step(METHODS[name], tmt.ARM, *state, rest, duration / steps)
-        return np.concatenate(state)
-
-    with mpmath.workdps(50):
-        coarse, fine = (max(abs(after(1, dt) - after(2, dt))) for dt in (large, large / 2))
-        order = float(mpmath.log(coarse / fine, 2)) - 1
-        assert order == pytest.approx(ORDERS[name], abs=0.3 if implicit else 0.15)
 
 
 def test_methods_keep_their_order_with_balls():
@@ -84,43 +58,6 @@ def test_an_adaptive_method_keeps_to_its_tolerance():
         errors.append(max(np.abs(a[-1] - b[-1]).max() for a, b in zip(path, exact)))
         assert 0.0 < errors[-1] < 100 * tolerance
     assert errors[0] > 1e6 * errors[-1]
-
-
-def test_every_evaluation_of_an_implicit_method_is_counted():
-    counted, stepping, state = 0, METHODS["implicit_midpoint"], (BENT.tolist(), [1.0, 2.0, 3.0])
-
-    def slope(q, qd):
-        nonlocal counted
-        counted += all(isinstance(x, float) for x in (*q, *qd))  # else it is for the Jacobian of one
-        return stepping.slope(tmt.ARM, q, qd, [0.0] * 3, 0.1)
-
-    for _ in range(4):
-        state = stepping.step(slope, *state, 0.1)
-    path = np.full((2, 1, 5, 3), np.nan)
-    path[:, 0, 0] = BENT, [1.0, 2.0, 3.0]
-    _, evaluations = runner_of(tmt.ARM, "implicit_midpoint").follow(*path, np.zeros((1, 3)), 0.1, 0.0, 1)
-    assert np.allclose(path[:, 0, -1], state, rtol=0, atol=1e-12)
-    # over any scalar the stages are found once more; compiled code counts the linear equations that it starts from
-    assert evaluations == counted
-
-
-@pytest.mark.parametrize("name", [name for name in METHODS if name != "gauss_legendre_4"])  # which takes long
-def test_the_jacobian_of_a_step_is_that_of_small_movements(name, monkeypatch):
-    """By the derivatives of its linear system, in parts, and by dual numbers through the solution."""
-    (q, later), (qd, faster), (tau, _) = random_states(np.random.default_rng(3), SMALL, 2)
-    stepping, dt, nv, move, h = METHODS[name], 0.05, len(SMALL.axis), SMALL.coordinates.move, 1e-6
-    J = amplification(stepping, SMALL, q, qd, tau, dt)
-    u = h * np.concatenate([np.eye(2 * nv), -np.eye(2 * nv)]).T  # a column each, all at once
-    state = [np.full(4 * nv, x) for x in q], [x + y for x, y in zip(qd, u[nv:])]
-    ends = one_step(stepping, SMALL, move(state[0], list(u[:nv])), state[1], tau.tolist(), dt)
-    (q1, q0), (qd1, qd0) = (np.split(np.array(part), 2, axis=1) for part in ends)
-    change = np.concatenate([SMALL.coordinates.difference(q1, q0), qd1 - qd0]) / (2 * h)
-    assert np.abs(change - J).max() < 1e-6 * np.abs(J).max()
-    monkeypatch.setattr(derivatives, "PART", nv)
-    both = amplification(stepping, SMALL, [later, q], [faster, qd], tau, np.array([0.02, dt]))
-    assert both[1] == pytest.approx(J, rel=1e-11, abs=1e-12)
-    monkeypatch.setattr(derivatives, "FEW_SPEEDS", nv)
-    assert amplification(stepping, SMALL, q, qd, tau, dt) == pytest.approx(J, rel=1e-10, abs=1e-10)
 
 
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
@@ -150,18 +87,6 @@ def test_which_gains_are_implicit(name, speed, position):
     assert np.allclose(np.array(dynamics.last.matrix), matrix, atol=1e-13)
     for slope in (a, stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt)):
         assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
-
-
-def test_a_controller_adds_to_the_torque(rng):
-    """Of hinges and slides beside a ball too; of no gains a Tree says nothing."""
-    place, speed, torque = random_state(rng, SMALL)
-    values = [place[i] for i in SMALL.coordinates.first_positions]
-    wanted = torque - np.array(SMALL.position_gain) @ values - np.array(SMALL.speed_gain) @ speed
-    plain = dataclasses.replace(SMALL, position_gain=(), speed_gain=())
-    expected = tmt.acceleration(place, speed, wanted, plain)
-    assert np.allclose(tmt.acceleration(place, speed, torque, SMALL), expected, rtol=1e-10, atol=1e-10)
-    zeros = dataclasses.replace(tmt.ARM, position_gain=np.zeros((3, 3)), speed_gain=np.zeros((3, 3)))
-    assert zeros == tmt.ARM and not zeros.has_gains and DRIVEN != FORK
 
 
 def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
@@ -223,15 +148,6 @@ def test_another_step_or_slope_is_taken_and_not_kept(own, form, folder, monkeypa
         state = one_step(stepping, tmt.ARM, *state, [0.0] * 3, 0.01)
         assert np.allclose(state, [motion.q[k], motion.qd[k]], rtol=0, atol=1e-12)
     assert not list(folder.glob("*"))  # it may be another tomorrow, with the same name
-
-
-def test_the_jacobian_of_a_step_is_that_of_its_own_slope():
-    class Floating(SemiImplicitEuler):
-        def slope(self, tree, q, qd, tau, dt, dynamics):
-            return [0.0 * x for x in qd]
-
-    J = amplification(Floating(False), tmt.ARM, BENT, REST, REST, 0.5)
-    assert np.array_equal(J, np.block([[np.eye(3), 0.5 * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]]))
 
 
 @pytest.mark.parametrize("own", [Midpoint, "rk4", None])

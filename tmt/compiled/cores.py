@@ -10,7 +10,6 @@ Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """How many cores of the machine this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

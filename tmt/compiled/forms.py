@@ -33,16 +33,14 @@ LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of deriv
 
 
 def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], ways: Iterable[Way]) -> Traced:
-    """Of way(w, *arrays), arrays of these sizes, for each w of the ways, what has the fewest operations."""
     return min((trace(name, sizes, partial(way, w)) for w in ways), key=lambda traced: traced.length)
 
 
 class Traceable(Dynamics):
     """Mbar and h of a form, for traced functions.
 
-    Of more than a few speeds the derivatives of h are in closed form, and linear systems are solved by a
-    function that is called. by_bodies: accelerations are those of articulated bodies, where all that a method
-    takes implicitly acts at single joints: then it counts as armature.
+    Of more than a few speeds the derivatives of h are in closed form, and linear systems solved by a call.
+    by_bodies: by articulated bodies, where all that a method takes implicitly acts at single joints.
     """
 
     def __init__(self, tree: AnyTree, terms: Terms, by_bodies: bool = False):

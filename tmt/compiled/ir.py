@@ -52,7 +52,6 @@ class Value:
         self.code, self.kind, self.name = code, kind, name
 
     def like(self, x: "Value | Number", kind: str = "") -> "Value":
-        """Another value, or a number as a constant of this kind (or another)."""
         return x if isinstance(x, Value) else self.code.number(x, kind or self.kind)
 
     def two(self, operation: str, a: "Value | Number", b: "Value | Number") -> "Value":
@@ -69,7 +68,6 @@ class Value:
         return self.code.put(self.kind, f"fneg {self.kind} {self.name}")
 
     def fma(self, b: "Value | Number", c: "Value | Number") -> "Value":
-        """self b + c, rounded once."""
         return self.code.intrinsic("fma", self, self.like(b), self.like(c))
 
     def function(self, name: str) -> "Value":
@@ -119,7 +117,6 @@ class Value:
         return Value(self.code, wide(self.kind, width), "undef").with_lane(0, self).shuffled([0] * width)
 
     def at(self, index: "Value | int", kind: str = DOUBLE) -> "Value":
-        """Of a pointer: the place of a number of an array."""
         place = self.like(index, INDEX)
         return self.code.put(POINTER, f"getelementptr {kind}, ptr {self.name}, i64 {place.name}")
 
@@ -136,8 +133,6 @@ class Value:
 
 
 class Variable:
-    """A value that changes, of one function; `first` from where it is made on."""
-
     def __init__(self, code: "Code", kind: str, first: Value | Number):
         self.kind, self.place = kind, code.reserve(kind)
         self.set(first)
@@ -203,7 +198,6 @@ class Code:
         return f"b{self.count}"
 
     def begin(self, label: str) -> None:
-        """A block begins; the one before it goes on to it, unless it went elsewhere."""
         self.lines += [f"  br label %{label}", f"{label}:"]
 
     @contextmanager
@@ -226,7 +220,6 @@ class Code:
             yield loop.index
 
     def branch(self, flag: Value, yes: str, no: str) -> None:
-        """Go on in one of two blocks, of which the first begins here."""
         self.lines += [f"  br i1 {flag.name}, label %{yes}, label %{no}", f"{yes}:"]
 
     @contextmanager

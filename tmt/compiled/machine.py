@@ -54,8 +54,6 @@ def object_code(text: str) -> bytes:
 
 
 class Library:
-    """Compiled functions, from LLVM's text or from an object file that was made of it."""
-
     def __init__(self, text: str = "", code: bytes | None = None):
         code = object_code(text) if code is None else code
         with lock:

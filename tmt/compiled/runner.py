@@ -27,8 +27,8 @@ runners: dict[tuple[int, str], "Runner"] = {}
 class Runner:
     """The runs of a tree by a method, of one state at a time or of several side by side with the same bits.
 
-    Paths q (runs, records, nq) and qd (runs, records, nv) begin with the first states; tau (runs, nv). All
-    are contiguous, float64 and memory of their own, which is not checked.
+    Paths q (runs, records, nq) and qd (runs, records, nv) begin with the first states; tau (runs, nv). That
+    all are contiguous and float64 is not checked.
     """
 
     def __init__(self, tree: Tree, stepping: Method):
@@ -74,7 +74,6 @@ class Runner:
         return self.outcome(q, qd, info, every)
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:
-        """What `follow` returns, once compiled code has filled the paths and info."""
         steps, codes = (q.shape[1] - 1) * every, info[:, :2]
         taken = steps * len(q)
         if codes[:, 0].any():

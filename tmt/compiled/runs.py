@@ -2,8 +2,7 @@
 
 run(q, qd, tau, dt, tolerance, info, every, records, runs): paths q (runs, records, nq) and qd (runs, records,
 nv) are filled from their first states, of which each `every`-th is kept; tau (runs, nv). info (runs, 3) of
-whole numbers: why each run ended, 0 where it did not, after how many steps, and how often the dynamics were
-evaluated. What a path holds after its end says nothing.
+whole numbers: why each run ended, 0 where it did not, after how many steps, and how many evaluations.
 """
 
 from collections.abc import Callable
@@ -29,12 +28,8 @@ SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
 
 def source(tree: Tree, stepping: Any, width: int) -> str:
     step = Step(tree, stepping, width)
-    if stepping.solves_stages:
-        advance = step.solving()
-    elif stepping.adaptive:
-        advance = step.adaptive()
-    else:
-        advance = step.explicit()
+    make = step.solving if stepping.solves_stages else step.adaptive if stepping.adaptive else step.explicit
+    advance = make()
     return module([*step.functions, run(step, advance)])
 
 
@@ -273,14 +268,13 @@ def run(step: Step, advance: Advance) -> Code:
 
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
-    """Why a state cannot be gone on from; 0: it can."""
     kind = wide(DOUBLE, width)
-    hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
     total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)
     for k in code.each(tree.coordinates.nq + tree.coordinates.nv):
         total.set(total.get() + state.load(k * width, kind))
-    for k in hinges:
-        angles = angles + state.load(k * width, kind).function("fabs")
+    for joint in tree.coordinates.joints:
+        if joint.kind == "hinge":
+            angles = angles + state.load(joint.q.start * width, kind).function("fabs")
     sound = total.get().function("fabs").compare("lt", float("inf"))
     sound = sound.bits("and", angles.compare("lt", LIMIT))
     return sound.choose(code.number(0, wide(INDEX, width)), DIVERGED)

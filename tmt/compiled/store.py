@@ -30,8 +30,7 @@ READING = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_N
 def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Library:
     """The compiled module of a source, from the folder if it lies there; what: all that it follows from.
 
-    Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept: it may be
-    another.
+    Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept.
     """
     words = [own_sources(), versions(), *map(word_of, what)]
     parts = [word for word in words if word is not None]
@@ -80,7 +79,6 @@ def digest(path: Path, code: bytes) -> bytes:
 
 
 def cache_folder() -> Path | None:
-    """None where there is no home."""
     if os.environ.get("TMT_CACHE"):
         return Path(os.environ["TMT_CACHE"])
     with suppress(RuntimeError):

@@ -43,7 +43,6 @@ class Traced:
 
     @cached_property
     def items(self) -> dict[int, list[int]]:
-        """Of a node with several results, which of them are needed."""
         items: dict[int, list[int]] = defaultdict(list)
         for i in self.nodes:
             if self.tape.nodes[i][0] == "item":
@@ -170,7 +169,6 @@ class Steps:
         code.give_back()
 
     def results(self, code: Code, i: int, value: Callable[[int], Value], width: int) -> dict[int, Value]:
-        """The values that a step makes, by node; value: of a node before it."""
         nodes = self.tape.nodes
         name, arguments = nodes[i]
         if name == "sincos":

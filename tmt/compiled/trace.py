@@ -187,7 +187,6 @@ class Expression:
 
     @property
     def negated(self) -> "Expression | None":
-        """x, if this is -x: else None."""
         operation, arguments = self.tape.nodes[self.i]
         return Expression(self.tape, arguments[0]) if operation == "neg" else None
 

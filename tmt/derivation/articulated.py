@@ -32,7 +32,6 @@ class Symmetric(NamedTuple):
         return Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ v
 
     def less_outer(self, a: Vector, b: Vector) -> "Symmetric":
-        """The matrix less a b', a along b."""
         off = Vector(a.y * b.z, a.x * b.z, a.x * b.y)
         return Symmetric(self.diagonal - Vector(a.x * b.x, a.y * b.y, a.z * b.z), self.off - off)
 
@@ -149,7 +148,6 @@ def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> Values:
 
 
 def gathered(tree: AnyTree, own: list[Record]) -> list[Record]:
-    """The sum of all that each joint carries, from what it carries itself."""
     result = list(own)
     for i in reversed(range(len(result))):
         if tree.parent[i] >= 0:

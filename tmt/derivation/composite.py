@@ -47,7 +47,6 @@ class Distribution(NamedTuple):
 
     @property
     def inertia(self) -> Matrix:
-        """I = tr(S) 1 - S, kg m2."""
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = self.second
         return Matrix([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
 
@@ -173,7 +172,6 @@ def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalar
 def mass_matrix_and_bias(
     tree: AnyTree, q: Scalars, qd: Scalars, number: Round = float
 ) -> tuple[Rows, Values]:
-    """Mbar and h, as in method.py."""
     n, joints, placements = len(tree.axis), tree.coordinates.joints, placed(tree, q)
     axes = [Vector(*axis) for axis in tree.axis]
     own, uneven, even = map(list, rounded(tree, number))
@@ -266,6 +264,5 @@ def turning(omega: Vector, omegad: Vector) -> Matrix:
 
 
 def vee(matrix: Matrix) -> Vector:
-    """Integral of x cross P x dm, for the matrix P S."""
     (_, xy, xz), (yx, _, yz), (zx, zy, _) = matrix
     return Vector(zy - yz, xz - zx, yx - xy)

@@ -129,7 +129,6 @@ def coordinates_of(kinds: tuple[str, ...]) -> Coordinates:
 
 
 def product(p: Scalars, r: Scalars) -> Values:
-    """The product p o r of two quaternions: the turn r, then p."""
     (a, x, y, z), (b, u, v, w) = p, r
     return [
         a * b - x * u - y * v - z * w,
@@ -149,7 +148,6 @@ def normalized(p: Scalars) -> Values:
 
 
 def exponential(u: Scalars) -> Values:
-    """The quaternion that turns by |u| rad about u."""
     x, y, z = u
     half = sqrt(x * x + y * y + z * z + TINY) * 0.5
     share = sin(half) / half * 0.5

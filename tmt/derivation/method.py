@@ -184,7 +184,6 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, 
 
 
 def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
-    """Mbar qdd + h (nv, N m)."""
     return with_rotors(tree, bias(bodies(tree, q, qd, qdd), tree.gravity), qdd)
 
 
@@ -203,7 +202,6 @@ def bias_rates(tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matri
 
 
 def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
-    """The stiffness of the spring and the movement from its rest, rad or m, for each speed, (nv,)."""
     movement = tree.coordinates.difference(q, tree.rest)
     joints = zip(tree.stiffness, tree.coordinates.joints)
     return [(stiffness, movement[k]) for stiffness, joint in joints for k in joint.speeds]
@@ -226,7 +224,6 @@ def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> Values:
 
 
 def with_diagonal(matrix: Sequence[Scalars], diagonal: Scalars) -> Rows:
-    """A matrix, (): of zeros, with these numbers added on its diagonal."""
     rows = [list(row) for row in matrix] or [[0.0] * len(diagonal) for _ in diagonal]
     for i, x in enumerate(diagonal):
         if x:

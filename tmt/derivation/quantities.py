@@ -1,7 +1,6 @@
 """Every quantity of a state, in one table: what it takes, its shape and unit, how it follows from the bodies.
 
-The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits
-(exact/many.py) are all served from it.
+The literal form, the compiled one and the truth in many digits (exact/many.py) are all served from it.
 """
 
 from collections.abc import Callable, Mapping
@@ -107,13 +106,11 @@ class State:
         return by_movement, added(by_speed, damped)
 
     def by_movement(self, function: Callable[[Values], Values]) -> Rows:
-        """Derivatives of a function of q by dual numbers, nv rows of nv."""
         moved = [self.tree.coordinates.component_rates(self.q, u) for u in unit_vectors(len(self.qd))]
         return jacobian(function, list(self.q), moved)
 
     @property
     def derivatives(self) -> list[Rows]:
-        """dqdd/dq, dqdd/dqd, dqdd/dtau, dtau/dq, dtau/dqd: from Mbar dqdd = dtau at the accelerations."""
         solved = [self.factors.solve_columns(rows) for rows in self.torque_rates]
         changes = [[[x * -1.0 for x in row] for row in rows] for rows in solved]
         return [*changes, self.factors.inverted(), *self.torque_rates]
@@ -224,7 +221,6 @@ def is_quantity(name: object) -> bool:
 
 
 def what_is_known(name: object) -> str:
-    """What a message says of a name that is no quantity's."""
     if isinstance(name, str) and name in QUANTITIES:
         return f"the name of a {QUANTITIES[name].argument} is expected after a colon, {name}:NAME"
     return f"known are {', '.join(PLAIN)}"

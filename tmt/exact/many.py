@@ -23,8 +23,6 @@ EXACT = Form(
 
 
 class Pairs(NamedTuple):
-    """Exact values: the sum of two doubles, (states, ...) each."""
-
     high: np.ndarray
     low: np.ndarray
 
@@ -32,7 +30,6 @@ class Pairs(NamedTuple):
         return self if k is None else Pairs(self.high[:, k], self.low[:, k])
 
     def distance(self, values: np.ndarray) -> np.ndarray:
-        """|values - exact|, (states, ...)."""
         with np.errstate(invalid="ignore"):  # a user's own equations may give NaN
             return np.abs((values - self.high) - self.low)
 

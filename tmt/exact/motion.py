@@ -47,8 +47,6 @@ class TooManySteps(ValueError):
 
 
 class Path(NamedTuple):
-    """A motion at equal times, each number as the sum of two doubles."""
-
     high: np.ndarray  # (records + 1, nq + nv) q and qd, rad and rad/s
     low: np.ndarray  # (records + 1, nq + nv)
     steps: int
@@ -60,7 +58,6 @@ class Equations(NamedTuple):
     rows: int
 
     def tables(self, inputs: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of `width` coefficients, high and low, with the numbers that are constant."""
         high, low = np.zeros((2, self.rows, width))
         constant = slice(inputs, inputs + self.numbers.shape[1])
         high[constant, 0], low[constant, 0] = self.numbers
@@ -72,8 +69,7 @@ def truth(
 ) -> tuple[Path, float]:
     """The motion, see `trajectory`, and its largest difference from a second run, rad or rad/s.
 
-    The two share neither the order nor, up to 40 speeds, the form of the equations: their difference shows
-    what truncation, rounding and the regrouping of the sums do together.
+    The two share neither the order nor, up to 40 speeds, the form of the equations.
     """
     first = trajectory(tree, q, qd, tau, dt, steps, every)
     form = "literal" if len(qd) <= MOST_LITERAL else "composite"

@@ -24,7 +24,6 @@ with mpmath.workdps(80):
 
 
 def two_sum(a: Scalar, b: Scalar) -> Both:
-    """a + b and what it is rounded by."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)

@@ -59,8 +59,6 @@ pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; 
 
 
 class Section(NamedTuple):
-    """A quantity: its symbol, what it is, and its entries."""
-
     letter: str
     title: str
     rows: list[list[Expression]]
@@ -141,7 +139,6 @@ def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
 
 
 def in_latex(expression: Expression, display: Display) -> str:
-    """A formula in which a line may break, within brackets too."""
     options = {"symbol_names": dict(display), "fold_func_brackets": True, "long_frac_ratio": 2}
     text: str = sympy.latex(expression, **options)
     return re.sub(r"\\(left|right)(?=[()])", "", text)
@@ -161,7 +158,6 @@ def tabular(rows: Sequence[Sequence[str]]) -> str:
 
 
 def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """An HTML page with MathML that needs no network: what `latex` shows."""
     equations, printer = [], Printer(symbolic.display)
     for section in sections(symbolic):
         equations.append(f"<h2>{html.escape(section.heading)}</h2>")

@@ -1,8 +1,7 @@
 """Functions of JAX, which take any batch of states; they can be jitted, mapped and differentiated.
 
-A function is a table of operations, level by level: those of a kind whose operands are known are one
-operation on rows of an array. As single statements, which XLA copies into each other, those of a robot of
-seven joints took minutes to run.
+A function is a table of operations, level by level: those of a kind whose operands are known are one on rows
+of an array. Single statements, which XLA copies into each other, took minutes for a robot of seven joints.
 """
 
 from collections import defaultdict

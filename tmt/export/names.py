@@ -125,7 +125,6 @@ class Names:
 
     @property
     def is_exact(self) -> bool:
-        """Whether all numbers that have no names are integers."""
         return self.named and all(x in (-1, 0, 1) for axis in self.axes for x in axis)
 
     def mechanism(self, scalar: Callable[[Expression], Scalar]) -> AnyTree:

@@ -66,7 +66,6 @@ class Forms:
         yield TR8(self.expression(poly).expand()).expand()  # products of sines and cosines as sums
 
     def expressions(self, poly: Polynomial) -> Iterator[Expression]:
-        """A polynomial with its common factors taken out, and as a product of polynomials."""
         yield self.expression(poly)
         if self.ring.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
@@ -91,7 +90,6 @@ class Forms:
 
 
 def cost(form: Expression) -> int:
-    """The number of operations in an expression; a minus in front of a product is free."""
     return form.count_ops() - bool(form.as_coeff_Mul()[0].is_negative)
 
 

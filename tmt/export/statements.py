@@ -32,7 +32,6 @@ class Function(NamedTuple):
 
     @property
     def used(self) -> list[tuple[str, int]]:
-        """Those of the inputs on which a result depends."""
         nodes = set(self.traced.nodes)
         return [place for place, x in zip(self.inputs, self.traced.inputs) if x.i in nodes]
 
@@ -59,8 +58,6 @@ class Syntax:
 
 
 class Line(NamedTuple):
-    """An assignment; name: of the value, "" for a number of a result."""
-
     text: str
     name: str = ""
 
@@ -105,7 +102,6 @@ class Writer:
         return Line(self.syntax.assignment.format(name=name, value=value), name)
 
     def text(self, i: int, least: int = SUM) -> str:
-        """The expression of a node, in brackets where it is bound less than `least`."""
         text, bound = self.known[i]
         return text if bound >= least else f"({text})"
 

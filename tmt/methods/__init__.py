@@ -52,7 +52,6 @@ class RungeKutta(Tableau):
         return rates, changes
 
     def combined(self, slopes: Slopes, q: Values, qd: Values, dt: Scalar, joints: Joints) -> State:
-        """The state one dt later, from the rates and accelerations of all stages."""
         rates, changes = slopes
         return joints.move(q, increments(dt, self.b, rates, len(qd))), advance(qd, dt, self.b, changes)
 

@@ -116,9 +116,8 @@ def amplification(
     """The exact Jacobian of one step, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
 
     q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or
-    (...). At an equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of
-    each mode per step. By dual numbers, all directions at once; so it holds for partitioned and implicit
-    methods too.
+    (...). At an equilibrium its eigenvalues are the growth of each mode per step. By dual numbers, all
+    directions at once; so it holds for partitioned and implicit methods too.
     """
     return transition(stepping, tree, q, qd, np.array(tau, float), dt, by_torque=False)
 

@@ -1,8 +1,7 @@
 """The coefficients of DOP853: the 8th-order method of Dormand and Prince with two embedded error estimates.
 
 Hairer, Norsett, Wanner: Solving Ordinary Differential Equations I (1993), section II.10, and their program
-dop853.f; each number is the double nearest to the printed one. RungeKutta checks that every row of A sums to
-c and b to 1; the order is measured by the tests.
+dop853.f; each number is the double nearest to the printed one.
 """
 
 A = (

@@ -108,7 +108,6 @@ def placed(joints: Joints, q: Values, moved: Values, balls: list[Values]) -> Val
 
 
 def largest(values: Values) -> float:
-    """The largest absolute value; of dual numbers that of their values."""
 
     def plain(value: Scalar) -> Scalar:
         return plain(value.value) if isinstance(value, Dual) else np.max(np.abs(value))

@@ -75,7 +75,6 @@ def by_speed(tree: AnyTree, of_joints: Iterable[T]) -> list[T]:
 
 @lru_cache(maxsize=64)
 def on_one_path(tree: AnyTree) -> list[list[bool]]:
-    """Whether the joints of two speeds lie on one path to the world, (nv, nv)."""
     before = [{i} for i in range(len(tree.parent))]
     for i, parent in enumerate(tree.parent):
         before[i] |= before[parent] if parent >= 0 else set()

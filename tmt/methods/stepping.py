@@ -1,8 +1,7 @@
 """What a method of integration is, `Method`, and the `Dynamics` that its `slope` asks for accelerations.
 
 Another way to have accelerations is a subclass of Dynamics: with calls in compiled code (forms.py), with
-derivatives by those of the linear system (derivatives.py). What a method is able to do is said by its fields;
-nothing asks for its type.
+derivatives by those of the linear system (derivatives.py).
 """
 
 from abc import ABC, abstractmethod
@@ -101,7 +100,6 @@ class Method(ABC):
     def slope(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
     ) -> Values:
-        """qdd from Mbar qdd = tau - D qd - h."""
         return dynamics.acceleration(tree, q, qd, tau)
 
     @abstractmethod
@@ -115,7 +113,6 @@ def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values
 
 
 def increments(dt: Scalar, weights: Sequence[float], slopes: Sequence[Values], n: int) -> Values:
-    """dt * sum of weights * slopes, (n,)."""
     return [dt * weighted(weights, (slope[k] for slope in slopes)) for k in range(n)]
 
 

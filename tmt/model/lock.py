@@ -120,7 +120,6 @@ def _refuse_fed_back(tree: Mechanism[float], locked_names: Any, q: Sequence[floa
 
 
 def _fixed(tree: Mechanism[float], i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
-    """Origin and turn of joint i's frame in its parent's: at the reference it rounds nothing."""
     joint = tree.coordinates.joints[i]
     if any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]:
         return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)

@@ -210,7 +210,6 @@ def _indices(name: str, values: Iterable[float], ends: Iterable[int]) -> Indices
 
 
 def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
-    """The rows of a gain, (nv, nv); () where nothing is fed back."""
     if isinstance(values, tuple | list) and not values:
         return ()
     rows = numbers_of(name, values, (coordinates.nv, coordinates.nv))

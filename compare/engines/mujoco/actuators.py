@@ -108,8 +108,8 @@ def moment_of(m: mujoco.MjModel, i: int) -> tuple[str, tuple[float, ...] | None]
 def stated_controls(source: Source) -> dict[int, tuple[float | None, ...]]:
     """By the number of a keyframe u of each actuator, None where it states none.
 
-    u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has zeros
-    where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
+    u of an integrator is its activation, of a filter the control, at which it settles. The compiled model has
+    zeros where a file states none: the file tells. Of a model compiled elsewhere all zeros are none.
     """
     m, spec = source.model, source.spec
     keys = spec.keys if spec is not None and len(spec.keys) == m.nkey else None

@@ -1,6 +1,6 @@
 """MuJoCo's own functions for timing: called from a compiled loop, with no Python between two calls.
 
-The C library that the Python package brings is called by its functions' addresses from a few lines of LLVM's text.
+The C library that the Python package brings is called by its functions' addresses from LLVM's text.
 """
 
 import ctypes
@@ -26,10 +26,10 @@ def library() -> str | None:
 
 
 def loops(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> dict[str, Run]:
-    """For each way run(count), which repeats it at one state, with contact and constraint stages off; {}: no library.
+    """Each way's run(count), which repeats it at one state, without contacts and constraints; {}: no library.
 
-    q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work is only what
-    forward dynamics needs; it solves M a = h, without any torque.
+    q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work
+    is only what forward dynamics needs; it solves M a = h, without any torque.
     """
     if (path := library()) is None:
         return {}
@@ -46,7 +46,7 @@ def loops(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarra
 def repeat(
     path: str, names: tuple[str, ...], model: mujoco.MjModel, data: mujoco.MjData, count: int
 ) -> np.ndarray:
-    """Call functions of the library one after the other, count times: the bias and the acceleration, (2, nv)."""
+    """Call functions of the library in turn, count times: the bias and the acceleration, (2, nv)."""
     results = np.zeros((2, model.nv))
     addresses = model._address, data._address, *(row.ctypes.data for row in results)
     repeated(path, names)(*addresses, count)
@@ -55,7 +55,7 @@ def repeat(
 
 @cache
 def repeated(path: str, names: tuple[str, ...]) -> Callable[..., None]:
-    """run(model, data, bias, acceleration, count): functions of the library one after the other, count times."""
+    """run(model, data, bias, acceleration, count): functions of the library in turn, count times."""
     more = {"mj_rne": ", i32 0, ptr %bias", "mj_solveM": ", ptr %acceleration, ptr %bias, i32 1"}
     lines = ""
     for k, name in enumerate(names):

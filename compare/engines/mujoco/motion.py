@@ -1,7 +1,7 @@
-"""What a robot does: motions of a file with everything on, which smaller models of the file repeat; and what they use."""
+"""Motions of a file with everything on, which smaller models of the file repeat; and what they use."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -49,10 +49,10 @@ def data_at(model: mujoco.MjModel, state: Array, whole: mujoco.MjModel) -> mujoc
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion of a whole model, which smaller ones repeat. All elements have names; controls are constant between times.
+    """A motion of a whole model whose elements have names; controls are constant between times.
 
-    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of each
-    actuator, (times, controls of it).
+    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of
+    each actuator, (times, controls of it).
     """
 
     name: str
@@ -160,7 +160,7 @@ class Simulation:
 
 
 def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, float]:
-    """How far two paths are apart at their common times: the largest of each joint that both have, rad or m, and point."""
+    """How far two paths are apart at common times: the largest of each common joint and point, rad or m."""
     steps = max(path.dt, other.dt)
     every, every_other = round(steps / path.dt), round(steps / other.dt)
     q, whole = path.q[::every], other.q[::every_other]
@@ -184,19 +184,17 @@ def apart(paths: Sequence[Path], others: Sequence[Path], points: Iterable[str] =
     return error if np.isfinite(error) else np.inf
 
 
-@dataclass
-class Use:
-    """What motions used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved
-    from its first position, rad or m.
+class Use(NamedTuple):
+    """What motions used: pairs of geoms that touched, what acted by kind, how far joints moved.
 
     middle: the mean positions of the joints; of a joint with a quaternion the start.
     """
 
-    pairs: set[tuple[str, str]] = field(default_factory=set)
-    acted: dict[str, set[str]] = field(default_factory=dict)
-    has_constraints: bool = False
-    ranges: dict[str, float] = field(default_factory=dict)
-    middle: dict[str, Array] = field(default_factory=dict)
+    pairs: set[tuple[str, str]]
+    acted: dict[str, set[str]]
+    has_constraints: bool
+    ranges: dict[str, float]
+    middle: dict[str, Array]
 
     @property
     def geoms(self) -> set[str]:
@@ -205,28 +203,24 @@ class Use:
 
 def used(simulation: Simulation) -> Use:
     """What the motions of a model use, step by step."""
-    m, use, path, forces = simulation.model, Use(), [], np.zeros(len(simulation.data.actuator_force))
+    m, path, most_rows, forces = simulation.model, [], 0, np.zeros(len(simulation.data.actuator_force))
     pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
     for d in simulation.stepped():
         pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
         acts = (d.efc_force != 0.0) | (d.efc_type != ACTS["equality"][0])
         rows.update(zip(d.efc_type[acts].tolist(), d.efc_id[acts].tolist()))
-        use.has_constraints |= d.nefc > 0
-        forces = np.maximum(forces, np.abs(d.actuator_force))
+        most_rows, forces = max(most_rows, d.nefc), np.maximum(forces, np.abs(d.actuator_force))
         path.append(d.qpos.copy())
-    use.pairs = {pair_of(m, pair) for pair in pairs}
+    acted = {"actuator": {name for name, force in zip(actuators(m), forces) if force}}
     for kind, types in ACTS.items():
-        use.acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
-    numbers = range(number_of_actuators(m))
-    use.acted["actuator"] = {element_name(m, "actuator", number) for number in numbers if forces[number]}
-    q = np.array(path)
-    use.ranges = movements(
-        Path(m, simulation.dt, q, q), Path(m, simulation.dt, np.tile(q[0], (len(q), 1)), q)
-    )
+        acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
+    q, middle = np.array(path), {}
+    still = np.tile(q[0], (len(q), 1))
+    ranges = movements(Path(m, simulation.dt, q, q), Path(m, simulation.dt, still, q))
     for name, (columns, _) in joints(m).items():
         is_number = columns.stop - columns.start == 1
-        use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
-    return use
+        middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
+    return Use({pair_of(m, pair) for pair in pairs}, acted, most_rows > 0, ranges, middle)
 
 
 def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
@@ -235,7 +229,7 @@ def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
 
 
 def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
-    """How far each speed would move each other one, were it locked at a position: (nv, nv) rad or m, moved by locked.
+    """How far each speed would move each other one, were it locked: (nv, nv) rad or m, moved by locked.
 
     Its own movement times its coupling through M, the largest at positions (times, nq).
     """
@@ -251,7 +245,7 @@ def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
 
 
 def stages_of(simulation: Simulation) -> dict[str, float]:
-    """The time of each stage of a step, us, by MuJoCo's own timers: medians, as other programs may interrupt a step."""
+    """The time of each stage of a step, us, by MuJoCo's timers: medians, as a step may be interrupted."""
     durations = np.array([data.timer.duration.copy() for data in simulation.stepped()])
     steps = 1e6 * np.median(np.diff(durations, axis=0), axis=0)
 
@@ -265,7 +259,7 @@ def stages_of(simulation: Simulation) -> dict[str, float]:
 def near(
     model: mujoco.MjModel, positions: Array, touched: set[tuple[str, str]]
 ) -> dict[tuple[str, str], float]:
-    """The pairs of geoms that came near and never touched, nearest first, and their least distances at positions, m."""
+    """The pairs of geoms that came near and never touched, and their least distances, m, nearest first."""
     wide, data = mujoco.MjModel.__copy__(model), mujoco.MjData(model)
     pairs: dict[tuple[str, str], float] = {}
     wide.geom_margin += NEAR

@@ -23,7 +23,7 @@ def varied(model: mujoco.MjModel, **numbers: ArrayLike) -> mujoco.MjModel:
 
 
 def has_free_base(model: mujoco.MjModel) -> bool:
-    """Whether a base would fall: it has a free joint, or slides along gravity on a joint that nothing drives or stops."""
+    """Whether a base would fall: by a free joint, or a slide along gravity that nothing drives or stops."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = np.abs(data.xaxis @ model.opt.gravity) > 0.1 * np.linalg.norm(model.opt.gravity)
@@ -35,7 +35,7 @@ def has_free_base(model: mujoco.MjModel) -> bool:
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
-    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base, not what it holds."""
+    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base."""
     free = [joint for joint in range(model.njnt) if kind_of(model, joint) == "free"]
     carried = [float(model.body_subtreemass[model.jnt_bodyid[joint]]) for joint in free]
     base = free[int(np.argmax(carried))] if free else -1
@@ -87,8 +87,9 @@ def held_servos(
 ) -> tuple[mujoco.MjModel, list[Servo]]:
     """The model with motors in place of its servos, and the laws by which a program commands them.
 
-    Position and velocity servos keep their gains. With kp, kv the other actuators of constant gain follow
-    kp (target - length) - kv speed in units of their force. controls: of the file, (nu,); targets: of each output.
+    Position and velocity servos keep their gains. With kp, kv the other actuators of constant gain follow kp
+    (target - length) - kv speed in units of their force. controls: of the file, (nu,); targets: of each
+    output.
     """
     motors, servos = varied(model), []
     for i in range(number_of_actuators(model)):
@@ -109,7 +110,7 @@ def held_servos(
 
 
 def with_servos(model: mujoco.MjModel, kp: float, kv: float, targets: np.ndarray) -> mujoco.MjModel:
-    """The model whose motors are servos of MuJoCo with these gains: where it rests, a program's servos rest."""
+    """The model whose motors are servos with these gains: where it rests, a program's servos rest."""
     servos = varied(model)
     for i in np.flatnonzero(model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE).tolist():
         set_law(servos, i, (0.0, 0.0, 0.0), servo_bias(kp, kv, targets[output_of(model, i)]))
@@ -149,7 +150,7 @@ def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
 
 
 def with_slower_contacts(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
-    """With the time constant of every contact times a factor; None: they are stated by stiffness and damping."""
+    """With the time constants of contacts times a factor; None: they are stated by stiffness and damping."""
     if (model.geom_solref[:, 0] <= 0.0).all() and (model.pair_solref[:, 0] <= 0.0).all():
         return None
     numbers = {"geom_solref": model.geom_solref.copy(), "pair_solref": model.pair_solref.copy()}

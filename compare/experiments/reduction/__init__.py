@@ -33,7 +33,7 @@ def claim_values(robot: Robot) -> dict[str, str | float]:
 
 
 def rows(setup: Setup) -> Result:
-    """Sub-blocks with joints locked; of a file what its motion needs, of the arm what each scene needs; exact swings."""
+    """Sub-blocks with joints locked; what the motion of a file or each scene of the arm needs; swings."""
     result, robot, needs = Result("reduction"), setup.robot, dict[Case, Needed]()
     if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
         result.find("driven", scenes=driven)
@@ -65,14 +65,14 @@ def rows(setup: Setup) -> Result:
 
 
 def is_asked(setup: Setup) -> bool:
-    """Whether a run answers what a motion of the file needs: by itself, in a full run, or with an option of it."""
+    """Whether a run answers what a motion of the file needs: alone, in a full run, or with an option of it."""
     request = setup.request
     given = request.error, request.points, request.controls, request.write
     return setup.alone or setup.size == "full" or any(option is not None for option in given)
 
 
 def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
-    """What scenes need: a row for each joint, a finding for scenes that need the same; what can be locked comes last."""
+    """What scenes need: a row for each joint, a finding for scenes with the same; joints to lock come last."""
     groups: dict[tuple[tuple[str, ...], ...], list[Case]] = {}
     for case, need in needs.items():
         names = tuple(name for name in case.joints if name in need.moves)

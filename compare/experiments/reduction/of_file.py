@@ -1,4 +1,4 @@
-"""No more model than a motion of a file needs: the answer, its tables, its checks, and the file to take away."""
+"""No more model than a motion of a file needs: the answer, tables, checks, the file to take away."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,7 +16,6 @@ from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, assets_of, files_of, finished, of_parts
 from ...engines.mujoco.source import Source
-from ...judge.agree import worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit, number_or_none
 from ...robots.case import SEED
@@ -26,7 +25,7 @@ from .limits import compared_limits, stable_answers
 from .records import FreeRow, JointRow, PairRow, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
 from .search import Answer, Locks, frontier, seconds_of, take_out
-from .sub_blocks import check_blocks, units_of
+from .sub_blocks import check_blocks, differences, units_of
 
 TEXT = "reduction_of_file"  # the template
 ERROR = 1e-3  # rad or m, if none is asked for
@@ -151,7 +150,7 @@ def add_checks(
     small: Smaller,
     written: Smaller,
 ) -> float:
-    """What is taken out changes no bit; the written file is within the error; its equations are those of tmt's lock.
+    """What is taken out changes no bit; the written file is within the error and has tmt's locked equations.
 
     How far the written file, with six digits, is from the model in memory, rad or m.
     """
@@ -177,10 +176,8 @@ def compare_locked(result: Result, where: str, tree: Tree, smaller: Tree) -> Non
     bodies, others = tree.body_joint, smaller.body_joint
     fused = np.array([bodies.count(joint) - others.count(joint) + 1 for joint in bodies])
     scale = Entries(tree, q, v, np.maximum(1, fused))
-    masses = tmt.mass_matrix(q, model=tree) - tmt.mass_matrix(q, model=smaller)
-    biases = tmt.bias(q, v, model=tree) - tmt.bias(q, v, model=smaller)
-    compared = (("Mbar", masses, scale.mass_matrix), ("bias", biases, scale.bias))
-    for quantity, differences, entries in compared:
-        unit, parties = units_of(coordinates)[quantity], "lock of tmt to the smaller model"
-        row = SubsetRow(locked="", quantity=quantity, parties=parties, unit=unit)
-        check_blocks(result, where, row, *worst_of_each(differences, entries))
+    both = [(tmt.mass_matrix(q, model=model), tmt.bias(q, v, model=model)) for model in (tree, smaller)]
+    compared = differences({"lock of tmt to the smaller model": both}, (scale.mass_matrix, scale.bias))
+    for (quantity, pair), (apart, sizes) in compared.items():
+        row = SubsetRow(locked="", quantity=quantity, parties=pair, unit=units_of(coordinates)[quantity])
+        check_blocks(result, where, row, apart, sizes)

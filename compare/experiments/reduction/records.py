@@ -27,7 +27,7 @@ class SubsetRow(Row):
 
 @dataclass
 class StageRow(Row):
-    """A stage of a step by MuJoCo's own timers: of the whole file, without what is not used, and of the smaller file."""
+    """A stage of a step by MuJoCo's timers: of the whole file, without what is not used, smaller."""
 
     stage: str
     whole_file: float = column("us")
@@ -60,7 +60,8 @@ class FreeRow(Row):
 class JointRow(Row):
     """How far a joint moved, rad or m. None: it is not to be locked.
 
-    predicted: how far it would move another one if it were locked; error_alone: the error of its lock in a run.
+    predicted: how far it would move another one if it were locked; error_alone: the error of its lock in a
+    run.
     """
 
     joint: str
@@ -81,7 +82,7 @@ class PairRow(Row):
 
 @dataclass
 class LimitRow(Row):
-    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv, or rests_elsewhere."""
+    """The largest stable step of a file; limit: as in step_limits.csv, or rests_elsewhere."""
 
     model: str
     integrator: str
@@ -94,8 +95,8 @@ class LimitRow(Row):
 class FrontierRow(Row):
     """A model with an integrator and a step: time over error, rad or m.
 
-    error_at_own_step: from the file's own run, both by its own step and integrator: of the model alone. best_for: the errors
-    for which it is the answer.
+    error_at_own_step: from the file's own run, both by its own step and integrator: of the model alone.
+    best_for: the errors for which it is the answer.
     """
 
     model: str

@@ -1,4 +1,4 @@
-"""The motions of a file that a smaller model is to repeat: of a keyframe, of recorded controls, or of a user's scenes."""
+"""The motions of a file that smaller models repeat: of a keyframe, recorded controls, a user's scenes."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass

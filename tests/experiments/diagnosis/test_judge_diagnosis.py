@@ -2,7 +2,7 @@
 
 import pytest
 from edited import XML, setup_of
-from small_runs import InProcess, Lines
+from in_process import InProcess, Lines
 
 from compare.core.check import Result
 from compare.core.text import say

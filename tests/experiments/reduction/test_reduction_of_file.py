@@ -52,7 +52,8 @@ HAND = f"""<mujoco><option integrator="implicitfast"/><worldbody><body><joint na
 <position name="thumb" tendon="thumb" kp="5"/></actuator></mujoco>"""
 TUMBLES = """<mujoco><worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 0 0.3" euler="20 30 0"><freejoint/>
 <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
-# it sinks a little to its rest: a box on a plate with a spring
+
+
 STANDS = """<mujoco><worldbody><body pos="0 0 1"><joint name="{0}" type="slide" axis="0 0 1" stiffness="{1}" damping="100"/>
 <geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody></mujoco>"""
 
@@ -229,14 +230,6 @@ def test_a_body_that_is_moved_from_outside_is_where_the_keyframe_has_it(tmp_path
     assert model.njnt == 1
 
 
-def test_what_the_scene_used_is_a_table(two_arms):
-    use = {row.part: row for row in two_arms[0].tables["reduction_use"]}
-    assert (use["actuators"].in_file, use["actuators"].used) == (5, 2)
-    assert (use["joints that move"].in_file, use["joints that move"].used) == (4, 2)
-    assert (use["geoms that touch"].in_file, use["geoms that touch"].used) == (6, 0)
-    assert use["sensors"].in_file == 1
-
-
 def test_each_kind_is_taken_out_of_what_the_kinds_before_it_have_left(two_arms):
     rows = two_arms[0].tables["reduction_free"]
     assert [row.before for row in rows[1:]] == [row.after for row in rows[:-1]]
@@ -315,18 +308,6 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
     assert steps and all(row.locked for row in steps)  # of the others the whole error is that of the step
 
 
-def test_errors_of_the_model_and_of_the_step_are_no_parts_of_the_whole(two_arms):
-    """They may cancel each other."""
-    (top, *_), path = two_arms[0].top, two_arms[1]
-    facts = top.values["facts"]
-    row = replace(facts["chosen"].row, error=4e-3, error_of_model=6e-3, error_of_step=2e-3)
-    told = say(
-        replace(top, values={"facts": facts | {"chosen": facts["chosen"]._replace(allowed=1e-2, row=row)}})
-    )
-    assert "error 4 mrad (of the model alone 6 mrad, of the step alone 2 mrad)" in told
-    assert "of that" not in told + path.read_text(encoding="utf-8")
-
-
 def test_after_a_joint_that_costs_too_much_others_are_tried():
     locks = SimpleNamespace(order=range(4), error=lambda groups: float(2 in groups))
     locks.first = lambda count: frozenset(range(count))
@@ -374,51 +355,6 @@ def test_no_answer_is_a_step_that_is_unstable_at_rest():
     assert max(candidate.row.dt for candidate in candidates) == 8e-3
     (limit,) = compared_limits(rests, rests.whole, ["RK4"])[1:]
     assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
-
-
-def test_bodies_that_the_file_fuses_are_fused_in_the_smaller_one_too():
-    """As those of a URDF: the whole file has one body less than is read of it."""
-    tool = '<body pos="0 0 -0.1"><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.2 0.3"/><geom size="0.01"/></body>'
-    fused = TWO_ARMS.replace("<mujoco>", '<mujoco><compiler fusestatic="true"/>').replace(
-        '<site name="left', tool + '<site name="left'
-    )
-    result = answered(fused, controls=waves("left upper"))
-    assert [str(check) for check in result.checks if not check.passed] == []
-    assert {row.joint for row in result.tables["reduction_joints"] if row.locked} >= {
-        "right upper",
-        "right lower",
-    }
-
-
-def many_legs(rng):
-    """A free trunk with 24 legs."""
-    legs = "".join(
-        f"""<body pos="{numbers(rng, 0.1)}"><joint name="leg {leg}" axis="{numbers(rng, 1.0)}"/>
-        <inertial pos="{numbers(rng, 0.05)}" mass="0.5" diaginertia="1e-3 1.2e-3 1.9e-3" quat="{numbers(rng, 1.0, 4)}"/></body>"""
-        for leg in range(24)
-    )
-    trunk = '<freejoint name="base"/><inertial pos="0.01 0 0" mass="5" diaginertia="0.1 0.12 0.2" quat="1 2 3 4"/>'
-    return f"<mujoco><worldbody><body>{trunk}{legs}</body></worldbody></mujoco>"
-
-
-def numbers(rng, size, count=3):
-    return " ".join(map(str, size * rng.normal(size=count)))
-
-
-def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
-    """An error of 1e-11 is still seen."""
-    rng = np.random.default_rng(1)
-    whole = Smaller.whole(Source(many_legs(rng)))
-    legs = {f"leg {leg}": rng.uniform(-2.0, 2.0, 1) for leg in range(24)}
-    small = search.locked(whole, legs)
-    assert small.model.nbody == 2
-    locked = read(whole.model).tree.lock({name: float(q[0]) for name, q in legs.items()})
-    smaller = read(small.model).tree
-    heavier = replace(smaller, mass=tuple((1.0 + 1e-11) * mass for mass in smaller.mass))
-    for other, passed in ((smaller, True), (heavier, False)):
-        result = Result("reduction")
-        of_file.compare_locked(result, "legs locked", locked, other)
-        assert all(check.passed for check in result.checks) is passed
 
 
 def test_a_file_whose_own_run_fails_is_not_judged():
