@@ -119,7 +119,7 @@ def compared_with(
     reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None,
     floating: bool = False,
 ) -> Compared:  # fmt: skip
-    """A file (None: the arm's) and a reference (None: the arm, if the file has its hinges, else the compiled model).
+    """A file (None: the arm's) and a reference (None: the arm for a file with its hinges, else model).
 
     joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
     solution: the path of the solution, if not `reference`; floating: the base of a URDF has a free joint.
@@ -189,7 +189,7 @@ def is_solution(reference: str | None) -> bool:
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:
-    """The file's joints in the order of the stated ones; those of other names. JointsDiffer if any is left."""
+    """The file's joints in the order of the stated ones, and those renamed. JointsDiffer if any is left."""
     try:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:

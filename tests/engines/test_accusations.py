@@ -8,7 +8,6 @@ from files import STL
 import tmt
 from compare.engines import RECORDS
 from compare.engines.outside import Outside
-from compare.engines.outside.file import Unwritten
 from compare.experiments.engines.causes import CAUSES
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult
@@ -161,48 +160,6 @@ def test_each_cause_has_a_script():
 
 
 @pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
-def test_nothing_is_said_of_an_engine_that_reads_the_number_right(engine, tmp_path):
-    """The same class with a <joint> of its own; a driven joint; one joint in each body."""
-    skip_unless_installed(engine)
-    defaults = DEFAULTS.replace('<geom density="500"/>', "<joint/>")
-    motor = '<actuator><motor joint="j"/></actuator>'
-    path = file_of(tmp_path, ARM.format(defaults, '<joint name="j" class="leg"/>', motor))
-    assert kinds_named(engine, path) == set()
-
-
-@pytest.mark.parametrize("engine, text, error", (
-    ("drake", MESHES.format("stl"), RuntimeError), ("drake", ARM.format("", HINGE, "").replace(' model="m"', ""), RuntimeError),
-    ("drake", ARM.format("", HINGE, ""), None),
-))  # fmt: skip
-def test_a_refusal_is_that_of_the_engine_and_not_credited_with_the_copy(engine, text, error, tmp_path):
-    skip_unless_installed(engine)
-    path = file_of(tmp_path, text)
-    reading = Outside(engine).of(compared_with("model", str(path)).robot.case()).reading
-    if error:
-        with pytest.raises(error):
-            drake(path)
-        assert reading["copied"][0] == "Refused"
-    else:
-        drake(path)
-        assert reading["copied"] is None
-
-
-def test_pinocchio_has_no_springs_and_applies_no_damping(tmp_path):
-    skip_unless_installed("pinocchio")
-    import pinocchio as pin
-
-    path = file_of(tmp_path, ARM.format("", '<joint name="j" axis="0 1 0" stiffness="9" damping="2"/>', ""))
-    model, accelerations = pinocchio(path), []
-    for damping in (0.0, 5.0):
-        model.damping = np.array([damping])
-        state = np.array([0.5]), np.array([1.0]), np.zeros(1)
-        accelerations.append(pin.aba(model, model.createData(), *state))
-    assert accelerations[0] == accelerations[1] and not any("stiffness" in name for name in dir(model))
-    reading = Outside("pinocchio").of(compared_with("model", str(path)).robot.case()).reading
-    assert reading["lacking"] == ("damping", "stiffness") and "stiffness" not in reading["read"]
-
-
-@pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
 def test_masses_and_a_gravity_that_were_read_otherwise_are_set(engine, tmp_path):
     skip_unless_installed(engine)
     second = f'<body pos="0.3 0 0" euler="0 0 40"><joint name="k" axis="0 1 0"/>{SPHERE}</body>'
@@ -216,36 +173,3 @@ def test_masses_and_a_gravity_that_were_read_otherwise_are_set(engine, tmp_path)
     share = 1e4 * RECORDS[engine].eps
     assert of.mass_matrix(q)[0] == pytest.approx(tmt.mass_matrix(q[0], robot.tree), rel=share)
     assert of.bias(q, v)[0] == pytest.approx(tmt.bias(q[0], v[0], robot.tree), rel=share)
-
-
-BALL = ARM.format("", '<joint name="j" type="ball"/>', "")
-BESIDE = f"""<mujoco><worldbody><body><freejoint name="f"/>{INERTIAL.format("0 0 1")}</body>
-<body>{HINGE}{INERTIAL.format("0 0 1")}</body></worldbody></mujoco>"""
-
-
-def test_a_limit_of_this_program_is_said_as_such(tmp_path):
-    """PyBullet could load two robots; a URDF has no ball joints: neither is called a refusal."""
-    skip_unless_installed("pybullet")
-    for text in (BESIDE, BALL):
-        robot = compared_with("model", str(file_of(tmp_path, text))).robot
-        with pytest.raises(Unwritten):
-            Outside("pybullet").of(robot.case()).reading  # noqa: B018
-
-
-def test_pybullet_takes_angles_of_a_quaternion_about_the_bodys_own_axes(tmp_path):
-    """Gravity on a body that is turned: its inverse dynamics has it right for the quaternion that is converted only."""
-    skip_unless_installed("pybullet")
-    import pybullet
-    from scipy.spatial.transform import Rotation
-
-    pybullet.connect(pybullet.DIRECT)
-    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-    (tmp_path / "b.urdf").write_text(f'<robot name="r"><link name="b">{inertial}</link></robot>')
-    body = pybullet.loadURDF(str(tmp_path / "b.urdf"))
-    pybullet.setGravity(0, 0, -9.81)
-    turn, converted = (Rotation.from_euler(axes, [0.4, 0.5, 0.6]) for axes in ("XYZ", "xyz"))
-    for quaternion, is_right in ((turn, False), (converted, True)):
-        state = [0.0, 0.0, 0.0, *quaternion.as_quat()], [0.0] * 6, [0.0] * 6
-        force = pybullet.calculateInverseDynamics(body, *state)[:3]  # linear first
-        assert np.allclose(force, turn.inv().apply([0.0, 0.0, 9.81])) == is_right
-    pybullet.disconnect()

@@ -91,27 +91,6 @@ def test_a_difference_is_judged_by_the_tolerance_of_its_entry(quantity, share, p
     assert [row.passed for row in outcome.rows] == [passes, True] and outcome.passed is passes
 
 
-def test_states_are_spread_within_the_ranges_and_those_of_floats_are_floats():
-    seen = []
-
-    class Seen(Altered):
-        def values(self, quantity, states):
-            seen.append(states[:3])
-            return super().values(quantity, states)
-
-    compared = compared_with("model", str(PATHS["arm7"]))
-    make = partial(Seen, compared.robot.tree, "", 0.0)
-    for single in (False, True):
-        outcome_of(make, "acceleration", compared=compared, single=single)
-    for states, kind in zip(seen, (np.float64, np.float32)):
-        for x in states:
-            assert x.shape == (COUNT, 7) and (np.ptp(x, axis=0) > 0.5 * np.abs(x).max(axis=0)).all()
-            assert (x == x.astype(kind)).all()
-    assert any((x != x.astype(np.float32)).any() for x in seen[0])
-    low, high = np.transpose(compared.robot.ranges)
-    assert (low <= seen[0][0]).all() and (seen[0][0] <= high).all()
-
-
 @pytest.mark.parametrize("language", [name for name in NEEDS if NEEDS[name]])
 def test_what_is_judged_is_what_was_written(language, tmp_path):
     """A wrong number in the text is found in the language's own values; and only in what it changes."""
