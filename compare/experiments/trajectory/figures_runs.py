@@ -192,8 +192,8 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
         if share is not None:
             lines_to(left, [share], [place], mark, colour, markersize=4.5)
     durations = [case.duration for name in shown for case in robot.cases if case.name == name]
-    to_end = {(run.case.name, run.dt) for run in result.runs}  # others have the beginning of a scene alone
-    until = {name: [row.judged_until for row in rows[name] if (name, row.dt) in to_end] for name in names}
+    beginnings = result.of_beginnings
+    until = {name: [row.judged_until for row in rows[name] if row not in beginnings] for name in names}
     judged = [min(until[name], default=0.0) for name in shown]
     places = range(len(shown))
     right.barh(places, durations, height=0.5, color=(GREY, 0.2), label="not judged")
@@ -206,7 +206,7 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
     left.tick_params(axis="y", labelsize=8)
     right.grid(axis="y", visible=False)
     fig.legend(loc="outside upper center", ncols=2, fontsize=7)
-    beginning = sorted({row.engine_integrator for row in result.rows if (row.scene, row.dt) not in to_end})
+    beginning = sorted({row.engine_integrator for row in beginnings})
     caption = result.finding(
         "overview_caption", label=result.label, share=largest_known([*shares.values()]), scenes=len(names),
         failing=failing, times=sorted({time for times in until.values() for time in times}), beginning=beginning,
