@@ -20,6 +20,7 @@ from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
+from ...engines.mujoco.step import takes_transition
 from ...judge.agree import share_of
 from ...judge.entries import Entries
 from ...judge.rounding import LEFT_OUT, of_positions
@@ -146,8 +147,8 @@ class Quantity(NamedTuple):
         if self.name == INVERSE:
             call = partial(of_inverse, dynamics, q, qd, accelerations(subject)[k])
             return [Way(BY_INVERSE, False, call)]
-        has_function = self.integrator != "RK4" and not getattr(dynamics.model, "nhistory", 0)  # of delays
-        functions = {TRANSITION: of_transition} if has_function else {}
+        is_taken = takes_transition(dynamics.model, self.integrator)
+        functions = {TRANSITION: of_transition} if is_taken else {}
         functions, ways = functions | {BY_STEPS: of_steps} if self.integrator else {}, []
         for side, (name, function) in product((ONE_SIDED, CENTRED), functions.items()):
             state = dynamics, q, qd, subject.tau[k], dt, self.integrator, side == CENTRED
