@@ -1,4 +1,4 @@
-"""Accelerations alone: as a function of the torque they are affine, so they have a mass matrix, a bias and inputs."""
+"""Accelerations alone are affine in the torque, so they have a mass matrix, a bias and inputs."""
 
 from functools import partial
 from typing import NamedTuple

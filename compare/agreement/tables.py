@@ -1,4 +1,4 @@
-"""What is wrong with a table of values, rather than with equations: a few of its rows, their order, its columns."""
+"""What is wrong with a table of values rather than with equations: some rows, their order, columns."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -88,7 +88,8 @@ def rounding_of_states(comparison: Comparison, name: str) -> ndarray:
     for key, unit in product((key for key, digits in sizes.items() if digits), np.eye(coordinates.nv)):
         step = 0.5 * 10.0 ** -float(sizes[key] or 0) * unit
         moved = rows | {key: coordinates.move(comparison.q, step) if key == "q" else comparison.qd + step}
-        total += np.abs(comparison.of_mujoco(name, moved["q"], moved["qd"]) - right)
+        value = comparison.asked(comparison.mujoco, name, moved["q"], moved["qd"])
+        total += np.abs(comparison.own(name)(value) - right)
     return total
 
 

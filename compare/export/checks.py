@@ -11,7 +11,7 @@ from tmt.derivation.quantities import quantity_of
 from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
-from ..engines.mujoco.calls import MinimalCalls
+from ..engines.mujoco.calls import loops
 from ..experiments.quantities import QUANTITIES, Quantity
 from ..judge.agree import closest
 from ..judge.entries import Entries, unit
@@ -157,9 +157,9 @@ def times(
     for name in names:
         for flag, library in libraries.items():
             calls[name, flag], _ = program.call(name, states, library)
-    if not MinimalCalls.unavailable():
-        loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(*(x[0] for x in states[:3]))
-        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"], count)
+    of_mujoco = loops(compared.mujoco.of(compared.robot.case()), *(x[0] for x in states[:3]))
+    if of_mujoco:
+        calls["mujoco"] = partial(of_mujoco["MuJoCo, mj_forward"], count)
     seconds = timing.fastest(calls, ROUNDS, time.thread_time)
     ns = {key: 1e9 * taken / count for key, taken in seconds.items()}
     rows = []

@@ -119,23 +119,6 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
 
 
-def test_meshes_of_files_are_held_once(tmp_path):
-    cache, mesh = mujoco.mj_getCache(), tmp_path / "mesh.obj"
-    mesh.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
-    text = f'<asset><mesh name="m" file="{mesh}"/></asset><worldbody><geom type="mesh" mesh="m"/></worldbody>'
-    before = mujoco.mj_getCacheCapacity(cache)
-    assert Source(f"<mujoco>{text}</mujoco>").model.nmesh == 1
-    assert mujoco.mj_getCacheSize(cache) == 0 and mujoco.mj_getCacheCapacity(cache) == before > 0
-
-
-def test_the_model_that_is_read_is_small_and_has_its_contacts():
-    text = f"<mujoco>{ASSETS}{BODIES}</mujoco>"
-    reading = read(text)
-    assert mujoco.mj_sizeModel(mujoco.MjModel.from_xml_string(text)) > 3 * PIXELS**2
-    assert mujoco.mj_sizeModel(reading.model) < 1e5 and len(pickle.dumps(reading)) < 2e5
-    assert reading.model.ngeom == 5
-
-
 def test_what_never_moves_has_its_part_of_a_total_mass():
     mesh = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
     still = '<body><geom type="mesh" mesh="m"/></body>'

@@ -1,16 +1,19 @@
-"""The files of a report: what stands on the first screen of the page and how it is marked, what all files have, what breaks."""
+"""The files of a report: the first screen of the page, what all files have, what breaks; pictures and provenance."""
 
 import json
 import re
+import subprocess
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure as Drawing
+from PIL import Image
 from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
-from compare.report import images
+from compare.report import images, provenance, style
 from compare.report.document import Document
 from compare.report.files import write
 from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
@@ -125,7 +128,7 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     sections[2].result.rows = [3]
     parts = write(folder, report)
     whys = {
-        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "ValueError",
+        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "TypeError",
         "speed in report.md": "AttributeError", "gravity in index.html": "FileNotFoundError",
         "speed in index.html": "AttributeError",
     }  # fmt: skip
@@ -137,3 +140,45 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     failed = [check for check in results["checks"] if not check["passed"]]
     assert results["passed"] is False and {check["experiment"] for check in failed} == {"report"}
     assert len(failed) == len(whys) and len(results["causes"]) == 1
+
+
+def pixels(source):
+    with Image.open(source) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)
+
+
+def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(tmp_path):
+    chart = Drawing(figsize=(4, 3), dpi=100)
+    axes = chart.subplots()
+    axes.set_facecolor("#f9f9f9")  # nearly as white as the paper
+    for k in range(9):
+        axes.plot(np.sin(np.linspace(0, 9, 400) + k), color=(style.BLUE, style.RED)[k % 2], linewidth=3)
+    chart.savefig(tmp_path / "whole.png")
+    images.save_figure(chart, tmp_path / "few.png")
+    whole, few = pixels(tmp_path / "whole.png"), pixels(tmp_path / "few.png")
+    off = np.abs(whole - few).max(axis=2)
+    assert whole.shape == few.shape and off.mean() < 3 and np.mean(off > 24) < 0.005
+    paper = (whole == 255).all(axis=2)
+    assert paper.sum() > 9999 and (few[paper] == 255).all()
+    sizes = [(tmp_path / name).stat().st_size for name in ("few.png", "whole.png")]
+    assert sizes == sorted(sizes)
+
+
+def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
+    assert provenance.commit() is None  # no repository
+
+    def git(*words):
+        command = ["git", "-c", "user.name=a", "-c", "user.email=a@b", *words]
+        return subprocess.check_output(command, cwd=tmp_path, text=True, stderr=subprocess.DEVNULL).strip()
+
+    for name in ("compare/a", "tmt/a", "mjcf/a", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    for words in (["init", "-q"], ["add", "-A"], ["commit", "-qm", "a"]):
+        git(*words)
+    (tmp_path / "notes.md").touch()
+    assert provenance.commit() == git("rev-parse", "HEAD")
+    (tmp_path / "tmt" / "b").touch()
+    assert provenance.commit() != git("rev-parse", "HEAD")
+    assert provenance.commit().startswith(git("rev-parse", "HEAD"))

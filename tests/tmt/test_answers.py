@@ -155,18 +155,6 @@ def test_numbers_beyond_the_largest_double():
         assert np.array_equal(tmt.energy(Z, qd), literal.energy(Z, qd)) and np.isinf(tmt.energy(Z, qd)).all()
 
 
-def test_who_cannot_wait_has_it_prepared(monkeypatch):
-    tree = tmt.ARM.lock({"alpha": 0.0, "beta": 0.5})
-    tmt.prepare(tree, "bias")
-    assert set(answers.answers_of(tree).prepared) == {"bias"}
-    with pytest.raises(ValueError, match="'weight'"):
-        tmt.prepare(tree, "weight")
-    assert tmt.prepare(tree) is None
-    assert {*answers.answers_of(tree).prepared} == {x for x in PLAIN if not QUANTITIES[x].is_long}
-    monkeypatch.setattr(literal, "acceleration", None)
-    assert np.isfinite(tmt.acceleration(Z[:1], Z[:1], Z[:1], tree)).all()
-
-
 def test_a_short_question_never_waits_for_a_compiler():
     program = "import sys, tmt; tmt.acceleration(*[[0.1] * 3] * 3); print('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "False\n"

@@ -102,15 +102,6 @@ def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(d
     assert_close(M @ qdd, force - h, np.abs(M).max() * np.abs(qdd).max(), 1e-12)
 
 
-@of_trees
-def test_the_rates_of_the_bias_are_its_derivatives_by_the_speeds(drawn):
-    """The bias has squares of the speeds, of which central differences of any step are exact."""
-    tree, q, qd, *_ = drawn
-    ends = [tmt.bias(q, qd + sign * np.eye(len(qd)), tree) for sign in (1.0, -1.0)]
-    expected = np.subtract(*ends).T / 2.0
-    assert_close(method.bias_rates(tree, q.tolist(), qd.tolist()), expected, np.abs(ends).max(), 256 * EPS)
-
-
 @settings(max_examples=20)
 @given(drawn_trees(), st.data())
 def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):

@@ -12,7 +12,7 @@ from many_digits import FIELDS, exact
 from trees import random_states, random_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import forms, straight
+from tmt.compiled import straight
 from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.exact.many import Pairs, exact_of_many
 from tmt.export import c
@@ -76,12 +76,6 @@ def test_brackets_keep_the_order_of_operations():
         names["out"] = [None] * len(results)
         exec("\n".join(line.text for line in Writer(traced, "abcd", results, syntax).lines), {}, names)
         assert np.allclose(names["out"], function(values), rtol=1e-14)
-
-
-def test_the_header_has_the_sizes():
-    text = tmt.equations(TREES["kinds"], "c header", ["bias"])
-    sizes = TREES["kinds"].coordinates
-    assert f"robot_nq = {sizes.nq}, robot_nv = {sizes.nv} " in text and sizes.nq != sizes.nv
 
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")
@@ -201,22 +195,3 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
 def test_what_is_no_parameter(words, quantity, why):
     with pytest.raises(ValueError, match=why):
         tmt.equations(tmt.ARM, "c", [quantity], parameters=words)
-
-
-def test_each_quantity_has_the_fewest_operations_of_the_forms():
-    """A tree of short branches and long paths: Mbar in the frames of the joints, or in the axes of the world."""
-    kinds = set()
-    for tree in (random_tree(np.random.default_rng(1), bodies=24), TREES["kinds"], tmt.ARM):
-        n = len(tree.axis)
-
-        def length(form, part, tree=tree, n=n):
-            def function(q, qd):
-                return forms.flat(form.terms(tree, q, qd)[part])
-
-            return straight.trace("f", (tree.coordinates.nq, n), function).operations
-
-        for part, name in enumerate(("mass_matrix", "bias")):
-            counts = [length(form, part) for form in forms.FORMS]
-            assert forms.quantity(tree, name).operations <= min(counts)
-            kinds.add((name, int(np.argmin(counts)) == 0))
-    assert ("bias", True) in kinds

@@ -1,4 +1,4 @@
-"""The runs that errors are measured against: their digits, the errors that they measure, and what is too stiff for a series."""
+"""Runs that errors are measured against: their digits, what is too stiff for a series; which joints a motion needs."""
 
 from dataclasses import replace
 
@@ -11,6 +11,7 @@ from compare.experiments.speed.runs import floor
 from compare.experiments.speed.settings import scenes_of
 from compare.robots.arm import ARM
 from compare.truth import reference
+from compare.truth.smallest import needed
 from tmt.exact import motion as reference_run
 
 BENT = next(case for case in scenes_of(ARM) if case.name == "bent, free")
@@ -82,9 +83,22 @@ def test_a_run_ends_where_it_would_take_too_many_steps(monkeypatch):
         run()
 
 
-def test_whether_a_model_is_too_stiff_is_seen_after_a_few_steps():
-    start = [1.0], [0.0], [0.0]
-    path = reference_run.trajectory(spring(1e8).tree, *start, 0.125, 1)
-    assert path.high[-1, 0] == pytest.approx(np.cos(0.125 * 1e4), abs=1e-9)
-    with pytest.raises(reference_run.TooManySteps, match="series"):
-        reference_run.trajectory(spring(1e14).tree, *start, 0.125, 1)
+KNOWN = {"zero, free": ("beta",), "ball catch, held": ARM.joints, "bent, held": ARM.joints}
+SCENES = {  # what is not needed, and the scene
+    "in its plane": (("beta",), {"posture": (20, 0, 40), "speed": (30, 0, -50)}),
+    "out of it by 1e-6 deg": ((), {"posture": (20, 1e-6, 40)}),
+    "sin of the double nearest to pi is not 0": ((), {"posture": (20, 180, 40)}),
+    "plane of a locked alpha": (("beta",), {"posture": (30, 0, 0), "locked": ("alpha",)}),
+    "at rest without gravity": (ARM.joints, {"posture": "bent", "gravity": False}),
+    "the rounded torque does not hold": (("beta",), {"posture": "zero", "torque": (-2.20725, 0, -2.20725)}),
+}
+
+
+def test_what_is_not_needed():
+    for case in ARM.cases:
+        assert needed(case).stays == KNOWN.get(case.name, ()), case.name
+
+
+@pytest.mark.parametrize("stays, scene", SCENES.values(), ids=SCENES)
+def test_what_is_not_needed_in_a_scene(stays, scene):
+    assert needed(ARM.case("a scene", **scene)).stays == stays

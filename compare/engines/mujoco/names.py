@@ -1,6 +1,7 @@
-"""MuJoCo's names and numbers: integrators, flags, rotations, and the joints of a compiled model as those of a Tree.
+"""MuJoCo's names and numbers: integrators, flags, rotations, the joints of a model as those of a Tree.
 
-A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a ball.
+A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a
+ball.
 """
 
 from typing import Any, NamedTuple
@@ -44,7 +45,7 @@ def on(m: mujoco.MjModel, flag: str) -> bool:
 
 
 def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
-    """The name of an element of a kind; `joint 3`, never another's name, where it has none that can be printed."""
+    """The name of an element; `joint 3`, never another's name, where it has none that can be printed."""
     stated, type_of = getattr(m, kind)(int(number)).name, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
     name = stated if stated.strip() and stated.isprintable() else f"{kind} {int(number)}"
     while name != stated and mujoco.mj_name2id(m, type_of, name) >= 0:
@@ -127,6 +128,11 @@ def aligns(joint: mujoco.MjsJoint) -> bool:
     is_left = joint.align == options.mjALIGNFREE_AUTO and bool(joint.compiler.alignfree)
     is_free = joint.type == mujoco.mjtJoint.mjJNT_FREE
     return bool(is_free and (is_left or joint.align == options.mjALIGNFREE_TRUE))
+
+
+def has_transition(m: mujoco.MjModel, integrator: str) -> bool:
+    """Whether mjd_transitionFD differentiates its step; nhistory: numbers that delays keep."""
+    return integrator != "RK4" and not getattr(m, "nhistory", 0)
 
 
 def number_of_actuators(m: mujoco.MjModel) -> int:

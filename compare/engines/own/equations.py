@@ -38,8 +38,8 @@ class OwnEquations:
     """
 
     def __init__(
-        self, source: object, coordinates: Coordinates, joints: JointMap | None = None, tree: tmt.Tree | None = None,
-        required: Sequence[str] = ("mass_matrix", "bias"),
+        self, source: object, coordinates: Coordinates, joints: JointMap | None = None,
+        tree: tmt.Tree | None = None, required: Sequence[str] = ("mass_matrix", "bias"),
     ):  # fmt: skip
         self.coordinates, self.tree = coordinates, tree
         self.functions = functions.functions_of(source, coordinates, required)
@@ -187,8 +187,7 @@ class OwnEquations:
         self.times[name] = min(times), min(times)
         if len(singles) == count:
             started = time.perf_counter()
-            with suppress(OwnError), warnings.catch_warnings(), np.errstate(all="ignore"):
-                warnings.simplefilter("ignore")
+            with suppress(OwnError), warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
                 together = self.called(name, [part[:count] for part in states], count, is_trial=True)
                 if functions.same(together, np.array(singles)):
                     self.takes_batches[name] = True

@@ -37,7 +37,7 @@ class Subject(NamedTuple):
 
 
 def cases_of(robot: Robot) -> list[Case]:
-    """A damped case, one of its own servos and a free one, as far as the robot has them; regular ones first."""
+    """A damped case, one of its servos and a free one, as far as there are such; regular ones first."""
     chosen: dict[str, Case] = {}
     for case in sorted(robot.cases, key=lambda case: "regular" not in case.scene.tags):
         if case.scene.locked:
@@ -59,7 +59,7 @@ def along(case: Case, states: int) -> Subject:
 
 
 def stiff(subject: Subject, dt: float) -> Subject:
-    """A state near the rest of springs with critical dampers, which settle in a few steps; free joints have none."""
+    """A state near the rest of critically damped springs, fast as a few steps; free joints have none."""
     tree, q, qd = subject.tree, subject.q[:1], subject.qd[:1]
     inertia = 1.0 / np.einsum("ii->i", tmt.inverse_mass_matrix(q[0], tree))
     rate, first = STIFF_RATE / dt, [joint.qd.start for joint in tree.coordinates.joints]

@@ -30,7 +30,9 @@ from .motion import free_scene
 from .readings import compare_numbers, file_of
 from .tables import EngineRow, EnginesResult, ReadRow
 
-EXPERIMENT = Experiment(order=65, serves_own=False, quick_speeds=0, options=("--engines",))
+EXPERIMENT = Experiment(
+    order=65, serves_own=False, quick_speeds=0, options=("--engines",), first_screen=("answer", "cheapest")
+)
 BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
 TABLES = "answer", "read", "methods", "servos", "batches"
