@@ -21,7 +21,7 @@ from .scene import Scene
 Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
-MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time where it is compared
+MOST_ENTRIES = 1_400_000  # of all Jacobians of a run, which take the time where it is compared
 COARSER = 4  # largest step / step of the file
 OWN_POSTURES = "qpos0", "middle"  # their names
 SAME_POSTURE = 1e-9  # rad or m

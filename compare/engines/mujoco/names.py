@@ -128,11 +128,6 @@ def aligns(joint: mujoco.MjsJoint) -> bool:
     return bool(is_free and (is_left or joint.align == options.mjALIGNFREE_TRUE))
 
 
-def has_transition(m: mujoco.MjModel, integrator: str) -> bool:
-    """Whether mjd_transitionFD differentiates its step; nhistory: numbers that delays keep."""
-    return integrator != "RK4" and not getattr(m, "nhistory", 0)
-
-
 def number_of_actuators(m: mujoco.MjModel) -> int:
     """From 3.10 to 4.0 the number of controls; since then an actuator may have several of them."""
     return int(getattr(m, "nactuator", m.nu))

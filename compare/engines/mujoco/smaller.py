@@ -14,7 +14,7 @@ from .changed import state_as_compiled
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Source, is_from_geoms
+from .source import Source, delete_textures, is_from_geoms
 from .variants import of_base
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
@@ -22,7 +22,7 @@ NAMED = {  # the elements that are known by their names, and their kinds in a co
     "equalities": "equality", "sites": "site", "bodies": "body",
 }  # fmt: skip
 OFF = int(mujoco.mjtLimited.mjLIMITED_FALSE)
-DRAWN = "skins", "lights", "cameras", "textures"
+DRAWN = "skins", "lights", "cameras"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 
 
@@ -94,10 +94,8 @@ def assets_of(path: File) -> File:
 
 def drawing(small: Smaller, use: Use) -> int:
     """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, meshes."""
-    for material in small.spec.materials:
-        material.textures = [""] * len(material.textures)
-    count = touchless(small, lambda geom: not (geom.contype or geom.conaffinity))
-    return count + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
+    count = delete_textures(small.spec) + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
+    return count + touchless(small, lambda geom: not (geom.contype or geom.conaffinity))
 
 
 def touchless(small: Smaller, is_needless: Callable[[mujoco.MjsGeom], bool]) -> int:
