@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from tmt.export.parameters import PAYLOAD, PLACES, Parameters
 
 from ..engines.mujoco import engine, read
-from ..engines.mujoco.changed import changed
 from ..engines.mujoco.reading import tree_with_sites
+from ..engines.mujoco.smaller import changed
 from ..robots.case import SEED
 from ..robots.file import robot_of
 from ..run.reference import Compared
