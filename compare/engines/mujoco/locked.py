@@ -1,4 +1,4 @@
-"""Compiled models with joints locked, which are not there, and with bodies that are welded, or have no mass, as one."""
+"""Compiled models without locked joints, and with bodies that are welded, or have no mass, as one."""
 
 from collections.abc import Collection, Mapping
 

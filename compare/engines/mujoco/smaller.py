@@ -29,7 +29,7 @@ REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjEN
 
 
 def spec_with_points(source: Source, points: Iterable[str]) -> mujoco.MjSpec:
-    """A copy of the file's spec with sites at bodies with these names. ValueError for a name that no body or site has."""
+    """A copy of the file's spec with sites at bodies of these names; ValueError for a name of neither."""
     assert source.spec is not None
     spec = source.spec.copy()
     sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))

@@ -1,4 +1,4 @@
-"""What each scene needs of the model: the joints that can be locked without changing its motion; exact swings."""
+"""What each scene needs of the model: joints that can be locked with the same motion; exact swings."""
 
 from collections.abc import Iterator, Mapping
 from functools import partial
@@ -73,14 +73,14 @@ def rows(setup: Setup) -> Result:
 
 
 def is_asked(setup: Setup) -> bool:
-    """Whether a run answers what a motion of the file needs: alone, in a full run, or with an option of it."""
+    """Whether a run answers what a motion of the file needs: alone, in full, or with an option of it."""
     request = setup.request
     given = request.error, request.points, request.controls, request.write
     return setup.alone or setup.size == "full" or any(option is not None for option in given)
 
 
 def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
-    """What scenes need: a row for each joint, a finding for scenes with the same; joints to lock come last."""
+    """What scenes need: a row for each joint, a finding for equal scenes; joints to lock come last."""
     groups: dict[tuple[tuple[str, ...], ...], list[Case]] = {}
     for case, need in needs.items():
         names = tuple(name for name in case.joints if name in need.moves)

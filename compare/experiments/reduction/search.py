@@ -29,7 +29,7 @@ Groups = frozenset[int]  # of joints that are locked, by their numbers
 
 
 def take_out(scene: Scene) -> list[tuple[FreeRow, Smaller]]:
-    """Take out one kind after the other if the motion is the same to the last bit: a row, and the model then."""
+    """Take out one kind after the other if the motion is the same to the last bit: rows and models."""
     paths, small, kinds = scene.run(scene.whole), scene.whole, []
     for kind, edit in FREE.items():
         trial = Smaller(small.spec.copy())
@@ -111,7 +111,7 @@ class Locks:
         return frozenset(self.order[:count])
 
     def within(self, allowed: float) -> Groups:
-        """The groups that can be locked for an error: all, or each that it allows, the one of least cost first."""
+        """The groups that can be locked for an error: all, or each that it allows, of least cost first."""
         chosen = self.first(len(self.order))
         if self.error(chosen) <= allowed:
             return chosen
