@@ -115,6 +115,7 @@ def free_damping(path):
     return max(joint.default_damping_vector())
 
 
+DAMPER = ARM.format("", '<joint name="j" springdamper="0.1 1"/>', "")
 MASS = compiled("body_mass")
 ARMATURE = '<actuator><position joint="j" armature="0.4"/></actuator>'
 BOX = '<geom type="box" size="0.1 0.05 0.02" {}/>'
@@ -142,6 +143,8 @@ CASES = (
      lambda path: drake(path).GetJointByName("j").default_damping(), compiled("dof_damping")),
     ("no_springs", "drake", ARM.format("", '<joint name="j" stiffness="7"/>', ""),
      lambda path: float(drake(path).num_force_elements() - 1), lambda path: 1.0),
+    ("springdamper", "drake", DAMPER, lambda path: drake(path).GetJointByName("j").default_damping(), compiled("dof_damping")),
+    ("springdamper", "newton", DAMPER, lambda path: newton(path).joint_damping.numpy(), compiled("dof_damping")),
     ("armature_without_motor", "drake", ARM.format("", '<joint name="j" armature="0.1"/>', ""),
      lambda path: float(drake(path).num_actuators()), compiled("dof_armature")),
     ("armature_of_actuator", "drake", ARM.format("", HINGE, ARMATURE), lambda path: [

@@ -103,6 +103,7 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
     for lighter in (source.model, source.without({}, bare=True)):
         for name in (*FIELDS, "dof_M0", "jnt_axis"):
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
+        assert lighter.ntexdata == 0 < whole.ntexdata
 
 
 def test_what_never_moves_has_its_part_of_a_total_mass():
