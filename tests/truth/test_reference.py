@@ -1,5 +1,7 @@
 """Runs that errors are measured against: their digits, what is too stiff for a series; which joints a motion needs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from servo_models import spring
@@ -45,6 +47,28 @@ def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_aga
     assert len({reference.reference(SHORT.changed(**change)).high[-1].tobytes() for change in changes}) == 4
     swing = reference.reference(SHORT.changed(name="swing", locked=("alpha", "beta")))
     assert swing.high.shape == swing.low.shape == (65, 2)
+
+
+def test_a_motion_is_computed_once_and_kept_with_all_that_it_follows_from(monkeypatch, tmp_path):
+    monkeypatch.setenv("TMT_CACHE", str(tmp_path))
+    computed = []
+    monkeypatch.setattr(reference, "truth", lambda *of: computed.append(of) or reference_run.truth(*of))
+    heavier = replace(SHORT.tree, mass=tuple(mass * (1.0 + 1e-15) for mass in SHORT.tree.mass))
+    start = tuple(map(tuple, (*SHORT.start, SHORT.tau)))
+
+    def path(tree, dt=0.005):
+        reference.in_pairs.cache_clear()  # as in another process
+        return reference.in_pairs(tree, *start, dt, 64, 1)
+
+    first, apart = path(SHORT.tree)
+    again, apart_again = path(SHORT.tree)
+    assert len(computed) == 1 and apart == apart_again and first.steps == again.steps
+    assert np.array_equal(first.high, again.high) and np.array_equal(first.low, again.low)
+    others = path(heavier), path(SHORT.tree, 0.0050001)
+    assert len(computed) == 3 and not any(np.array_equal(first.low, other.low) for other, _ in others)
+    for file in tmp_path.iterdir():  # damaged
+        file.write_bytes(file.read_bytes()[:-1])
+    assert np.array_equal(path(SHORT.tree)[0].low, first.low) and len(computed) == 4
 
 
 def test_a_run_ends_where_it_would_take_too_many_steps(monkeypatch):

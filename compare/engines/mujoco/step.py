@@ -12,12 +12,10 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Drive
-from .names import INTEGRATORS, bit, element_name, number_of_actuators, output_of, set_control
+from .names import INTEGRATORS, bit, element_name, has_transition, number_of_actuators, output_of, set_control
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
-# what delays and yielding springs remember
-REMEMBERED = sum(int(getattr(mujoco.mjtState, f"mjSTATE_{part}", 0)) for part in ("HISTORY", "PLASTIC"))
 TOLERANCE, ITERATIONS, LINE_SEARCH = 1e-15, 200, 100  # of MuJoCo's solver: the force of constraints, exactly
 NUDGE = 1e-7  # rad, m and their rates: of central differences
 LITTLE = 1e-6  # of an activation at the start of a run that is pushed
@@ -27,11 +25,6 @@ BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS",
 Act = Callable[[int], None]  # before a step of a run, by its number
 # of models, which are not changed afterwards, for their steps; as long as they are in use
 copies: WeakKeyDictionary[mujoco.MjModel, mujoco.MjModel] = WeakKeyDictionary()
-
-
-def takes_transition(model: mujoco.MjModel, integrator: str) -> bool:
-    """Whether mjd_transitionFD is right: it refuses RK4 and delays, and where springs yield it leaves what has yielded."""
-    return integrator != "RK4" and not mujoco.mj_stateSize(model, REMEMBERED)
 
 
 class Step:
@@ -100,8 +93,8 @@ class Step:
         activations.
         """
         sides, columns = self.sides(state, nudge), list[np.ndarray]()
-        is_taken = takes_transition(self.model, self.integrator)
-        if is_taken and all(ahead.any() and behind.any() for ahead, behind in sides):
+        has_function = has_transition(self.model, self.integrator)
+        if has_function and all(ahead.any() and behind.any() for ahead, behind in sides):
             A = np.zeros((self.size, self.size))
             self.put(state)
             mujoco.mjd_transitionFD(self.model, self.data, nudge, True, A, None, None, None)

@@ -20,7 +20,7 @@ from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
-from ...engines.mujoco.step import takes_transition
+from ...engines.mujoco.names import has_transition
 from ...judge.agree import share_of
 from ...judge.entries import Entries
 from ...judge.rounding import LEFT_OUT, of_positions
@@ -147,9 +147,9 @@ class Quantity(NamedTuple):
         if self.name == INVERSE:
             call = partial(of_inverse, dynamics, q, qd, accelerations(subject)[k])
             return [Way(BY_INVERSE, False, call)]
-        is_taken = takes_transition(dynamics.model, self.integrator)
-        functions = {TRANSITION: of_transition} if is_taken else {}
-        functions, ways = functions | {BY_STEPS: of_steps} if self.integrator else {}, []
+        functions, ways = {BY_STEPS: of_steps} if self.integrator else {}, []
+        if functions and has_transition(dynamics.model, self.integrator):
+            functions = {TRANSITION: of_transition} | functions
         for side, (name, function) in product((ONE_SIDED, CENTRED), functions.items()):
             state = dynamics, q, qd, subject.tau[k], dt, self.integrator, side == CENTRED
             ways.append(Way(f"{name}, {side}", side == CENTRED, partial(function, *state)))

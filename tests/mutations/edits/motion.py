@@ -50,7 +50,7 @@ EDITS = (
     ("exact_motion", "check_falling", "fine <= ROUNDED", "False", "the order is measured among rounding"),
     ("exact_motion", "check_falling", "coarse / fine", "16.0", "the order is not measured"),
     ("pendulum", "swing", "ellipj(frequency * t + _1, k * k)[0]", "np.sin(frequency * t)", "a sine as the exact swing"),
-    ("sub_blocks", "sub_block_differences", "(reduced[0], reduced[1])", "(reduced[0], reduced[0])", "TMT compared with itself"),
+    ("sub_blocks", "sub_block_differences", "(reduced[0], reduced[1])", "(reduced[0], reduced[0])", "TMT beside itself"),
     ("sub_blocks", "compare_blocks", "rng.uniform(-10.0, 10.0, _1)", "1e-10 * _0", "no bias in motion"),
     ("reduction.search", "groups_of", "use.ranges[name] <= most[name]", "True", "what the motion is about may be locked"),
     ("reduction.search", "Locks.within", "self.error(chosen | {group}) <= allowed", "True", "any joint more may be locked"),
