@@ -69,7 +69,7 @@ class Run:
     setup: Setup
     folder: Path  # for the folder of figures
     terminal: Terminal
-    workers: Workers | Executor
+    workers: Executor | Workers
     clock: Clock = field(default_factory=Clock)
     sections: list[Section] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)

@@ -8,7 +8,8 @@ import pytest
 from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, sphere
 
 from compare.engines.mujoco.forces import forces_near
-from compare.engines.mujoco.names import INTEGRATORS, REMEMBERED
+from compare.engines.mujoco.names import INTEGRATORS
+from compare.engines.mujoco.step import REMEMBERED
 from compare.stability.closed_form import matrix, radius_apart
 from compare.stability.growth import growth
 

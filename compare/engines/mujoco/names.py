@@ -14,18 +14,14 @@ from ...robots.coordinates import FREE, Coordinates
 
 Integer = int | np.integer[Any]
 # those that the installed version has; discrete came with 3.13
-MEMBERS = {
-    name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None)
-    for name in ("Euler", "implicitfast", "discrete", "implicit", "RK4")
-}
+NAMES = "Euler", "implicitfast", "discrete", "implicit", "RK4"
+MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None) for name in NAMES}
 INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
 # dynamics of an activation that settles where its control leads, or stays
 SETTLING = [getattr(mujoco.mjtDyn, f"mjDYN_{name}") for name in ("INTEGRATOR", "FILTER", "FILTEREXACT")]
 FREE_PARTS = ("x", "y", "z", "turn")
-# what delays and yielding springs keep from step to step
-REMEMBERED = sum(int(getattr(mujoco.mjtState, f"mjSTATE_{part}", 0)) for part in ("HISTORY", "PLASTIC"))
 
 
 def integrator_by_name(name: str) -> str:
@@ -130,11 +126,6 @@ def aligns(joint: mujoco.MjsJoint) -> bool:
     is_left = joint.align == options.mjALIGNFREE_AUTO and bool(joint.compiler.alignfree)
     is_free = joint.type == mujoco.mjtJoint.mjJNT_FREE
     return bool(is_free and (is_left or joint.align == options.mjALIGNFREE_TRUE))
-
-
-def has_transition(m: mujoco.MjModel, integrator: str) -> bool:
-    """Whether mjd_transitionFD is right: it refuses RK4 and delays, and leaves what springs have yielded."""
-    return integrator != "RK4" and not mujoco.mj_stateSize(m, REMEMBERED)
 
 
 def number_of_actuators(m: mujoco.MjModel) -> int:

@@ -125,13 +125,12 @@ def tendons(small: Smaller, use: Use) -> int:
 
 def limits(small: Smaller, use: Use) -> int:
     """Limits of joints and tendons that never act; their ranges stay, as a servo may have the same."""
-    count = 0
-    for elements, kind in (("joints", "joint"), ("tendons", "tendon")):
-        limited = getattr(small.model, "jnt_limited" if kind == "joint" else "tendon_limited")
-        for element in getattr(small.spec, elements):
-            if limited[element.id] and element.name not in use.acted[kind]:
-                element.limited, count = OFF, count + 1
-    return count
+    model, acted = small.model, use.acted
+    ends = [x for x in small.spec.joints if model.jnt_limited[x.id] and x.name not in acted["joint"]]
+    ends += [x for x in small.spec.tendons if model.tendon_limited[x.id] and x.name not in acted["tendon"]]
+    for element in ends:
+        element.limited = OFF
+    return len(ends)
 
 
 def stages(small: Smaller, use: Use) -> int:

@@ -163,8 +163,7 @@ def fits(reading: Reading, numbers: Mapping[str, Array], eps: float, entry: Entr
         return False
     number = entry.number
     read, stated, changed = reading["read"][number], reading["stated"][number], numbers[number]
-    # the text of meshes is rounded
-    bar = max(FACTOR * eps * size_of(reading["stated"], number), CLOSE * np.abs(changed).max(initial=0.0))
+    bar = FACTOR * eps * max(size_of(numbers, number), size_of(reading["stated"], number))
     distances = changed - read, changed - stated, read - stated
     if number.startswith("anchor"):  # any point of the axis is one
         axis = numbers[number.replace("anchor", "axis")]
@@ -258,12 +257,18 @@ SEEN = {find.__name__: find for find in (
 FLOAT32 = float32_meshes.__name__
 # what is known of each engine, in the order in which it is tried
 OF_ENGINES: Mapping[str, Sequence[str]] = {
-    "drake": ("class_without_joint", "no_springs", "armature_of_actuator", "passive_of_free", "armature_without_motor",
-              "gravity_flag", "total_mass", "bounds", "groups", "shell_inertia", "frame", "replicate", FLOAT32,
-              "mass_of_meshes", "several_joints"),
-    "pinocchio": ("joint_pos_of_class", "armature_of_actuator", "option_gravity", "gravity_flag", "total_mass", "bounds",
-                  "groups", "geom_mass_of_class", "geoms_without_contacts", "fixed_root", "frame", "other_roots",
-                  "oblique_turn", "mass_of_meshes", "turned_start"),
-    "newton": ("armature_of_actuator", "passive_of_free", "option_gravity", "total_mass", "shell_inertia", "replicate",
-               "small_inertia", "mass_of_meshes", "several_joints"),
+    "drake": (
+        "class_without_joint", "no_springs", "springdamper", "armature_of_actuator", "passive_of_free",
+        "armature_without_motor", "gravity_flag", "total_mass", "bounds", "groups", "shell_inertia", "frame", "replicate",
+        FLOAT32, "mass_of_meshes", "several_joints",
+    ),
+    "pinocchio": (
+        "joint_pos_of_class", "armature_of_actuator", "option_gravity", "gravity_flag", "total_mass", "bounds", "groups",
+        "geom_mass_of_class", "geoms_without_contacts", "fixed_root", "frame", "other_roots", "oblique_turn",
+        "mass_of_meshes", "turned_start",
+    ),
+    "newton": (
+        "springdamper", "armature_of_actuator", "passive_of_free", "option_gravity", "total_mass", "shell_inertia",
+        "replicate", "small_inertia", "mass_of_meshes", "several_joints",
+    ),
 }  # fmt: skip

@@ -167,6 +167,7 @@ DELETED = {
     "groups": ("compiler", "inertiagrouprange"),
     "geom_mass_of_class": (".//default/geom", "mass"), "shell_inertia": (".//geom", "shellinertia"),
     "armature_of_actuator": ("actuator/*", "armature"), "no_springs": (".//joint", "stiffness"),
+    "springdamper": (".//joint", "springdamper"),
 }  # fmt: skip
 LEFT_OUT = "frame", "replicate"
 LOSSES: Mapping[str, Loss] = {
