@@ -15,7 +15,7 @@ from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
-from ..process.workers import Clock, WorkerEnded, Workers, load_modules
+from ..process.workers import Clock, WorkerEnded, Workers, give_back_memory, load_modules
 from ..report.terminal import Terminal
 from ..report.verdict import Figure, Section, failures
 from ..robots import Robot
@@ -128,6 +128,7 @@ class Run:
         return block("run", "not_quick", name=name, most=most)
 
     def examine(self, name: str) -> None:
+        give_back_memory()  # what the one before, or the reading of the file, needs no more
         self.clock.under_way = name
         with self.clock.of(name):
             self.setup.progress(block(name, "summary"))

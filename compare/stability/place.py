@@ -10,7 +10,7 @@ import numpy as np
 
 import tmt
 
-from ..engines.mujoco.names import element_name
+from ..engines.mujoco.names import element_name, on
 from ..engines.mujoco.reading import Reading
 from ..engines.mujoco.step import Step, distance, start_of
 from ..engines.mujoco.variants import add_armature, has_free_base, in_the_air, of_base, without_dry_friction
@@ -93,7 +93,7 @@ class Place:
 
     @property
     def tree(self) -> tmt.Tree:
-        return replace(self.reading.tree, gravity=tuple(self.model.opt.gravity))
+        return replace(self.reading.tree, gravity=tuple(self.model.opt.gravity * on(self.model, "GRAVITY")))
 
     @property
     def surroundings(self) -> str:

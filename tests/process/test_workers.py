@@ -4,6 +4,8 @@ import os
 import signal
 import time
 from contextlib import closing
+from ctypes import CDLL
+from pathlib import Path
 
 import pytest
 
@@ -38,6 +40,27 @@ def test_what_a_worker_does_is_for_the_task_that_asked():
         assert workers.clock.task == ""
         assert workers.clock.seconds_of("first") >= 4 * LONG
         assert LONG <= workers.clock.seconds_of("second") < 4 * LONG
+
+
+def fill_memory():
+    """Take 100 MB in small pieces, of which every tenth stays."""
+    pieces = [bytearray(2000) for _ in range(50_000)]
+    kept.extend(pieces[::10])
+
+
+def resident():
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+kept: list[bytearray] = []
+
+
+@pytest.mark.skipif(not hasattr(CDLL(None) if os.name == "posix" else None, "malloc_trim"), reason="no glibc")
+def test_what_a_call_needs_no_more_is_given_back():
+    with closing(Workers(1, Beginning())) as workers:
+        before = workers.submit(resident).result(SOON)
+        workers.submit(fill_memory).result(SOON)
+        assert workers.submit(resident).result(SOON) - before < 70e6
 
 
 ENDS = {"killed by SIGKILL": (signal.raise_signal, signal.SIGKILL), "exit status": (os._exit, 0)}

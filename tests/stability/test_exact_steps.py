@@ -106,6 +106,12 @@ def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
     assert known == rows.get(kind, 0)
 
 
+def test_the_closed_form_of_a_pendulum_upside_down_has_no_gravity_where_a_flag_disables_it():
+    pendulum = '<body><joint axis="0 1 0" stiffness="0.1"/><geom size="0.1" pos="0 0 0.3"/></body>'
+    text = f'<mujoco><option><flag gravity="disable"/></option><worldbody>{pendulum}</worldbody></mujoco>'
+    assert abs(radius_apart(rest_of(text), place_of(text).tree)) < SAME
+
+
 def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     place = place_of(LEG)
     assert radius_apart(rest_of(LEG), place.tree) is not None

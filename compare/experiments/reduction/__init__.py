@@ -61,13 +61,8 @@ def rows(setup: Setup) -> Result:
             result.check(
                 "every subset", quantity, 0, 1, "models", str(error), rule="equal", about=About.PROGRAM
             )
-    if setup.reading and not robot.is_stated:
-        if is_asked(setup):
-            of_file.add(result, setup, setup.reading)
-        elif subsets := result.tables.get("reduction_subsets"):
-            failing = sum(not check.passed for check in result.checks if check.rounding)
-            count = len({row.locked for row in subsets})
-            result.top.append(result.finding("blocks", count=count, failing=failing))
+    if setup.reading and not robot.is_stated and is_asked(setup):
+        of_file.add(result, setup, setup.reading)
     add_needs(result, needs)
     return result
 

@@ -167,7 +167,7 @@ def follow(
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
             for scheme, methods in schemes.items():
-                stable = stable_part(case, scheme)
+                stable = stable_part(case, scheme, case.duration / steps)
                 twin = run_of_twin(stable, dynamics[first], steps, scheme)
                 runs = [compare_run(result, twin, dynamics[mujoco], method) for method in methods]
                 if stable is case:
@@ -175,15 +175,15 @@ def follow(
     return result
 
 
-def stable_part(case: Case, scheme: str) -> Case:
-    """The case; in a scene of a file whose step the scheme does not bear, its beginning, with a step that it bears.
+def stable_part(case: Case, scheme: str, dt: float) -> Case:
+    """The case; in a scene of a file, if the scheme does not bear dt, its beginning, with a step that it bears.
 
     The forces of springs limit every scheme, those of damping RK4, and those of servos Euler, too.
     """
     stepping, (decay, frequency) = METHODS[scheme], rates_at(case.tree, case.q)
     has_damping = not case.tree.has_gains or getattr(stepping, "implicit_gains", False)
     rate = frequency if has_damping and stepping.stages == 1 else max(decay, frequency)
-    if "user" in case.scene.tags or not case.robot.is_read or rate * case.scene.dt <= BEARABLE:
+    if "user" in case.scene.tags or not case.robot.is_read or rate * dt <= BEARABLE:
         return case
     return case.changed(duration=case.steps / rate, dt=1.0 / rate)
 

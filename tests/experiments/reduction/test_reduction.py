@@ -9,7 +9,6 @@ from models import PATHS, chain
 
 import tmt
 from compare.core.check import Result
-from compare.core.text import say
 from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
 from compare.experiments.reduction import sub_blocks
@@ -80,20 +79,6 @@ def test_of_many_joints_some_are_locked_each_alone():
     of_many = blocks(setup_of_file(chain(7)))
     assert len({check.scene for check in of_many.checks}) == 4 and failed(of_many) == []
     assert not blocks(setup_of_file(chain(60))).checks
-
-
-def test_a_quick_run_of_a_file_says_what_it_answered(monkeypatch):
-    setup = setup_of_file(PATHS["gripper"])
-    (told,) = map(say, reduction.rows(setup).top)
-    assert told.startswith(
-        "With 14 choices of joints locked, Mbar and the bias are the blocks of the whole model's;"
-    )
-    monkeypatch.setattr(sub_blocks, "FACTOR", 0.0)
-    result = reduction.rows(setup)
-    (told,) = map(say, result.top)
-    assert (
-        failed(result) and f"only in part: {len(failed(result))} checks fail; reduction --mjcf FILE" in told
-    )
 
 
 def test_a_joint_of_a_file_that_cannot_be_taken_out_is_no_failure():
