@@ -202,7 +202,7 @@ def kinds_named(engine, path):
     robot, result = compared_with("model", str(path)).robot, EnginesResult("engines")
     result.tables["engines_read"] = []
     try:
-        compare_numbers(result, robot, engine, Outside(engine).of(robot.case()).reading)
+        compare_numbers(result, robot, RECORDS[engine], Outside(engine).of(robot.case()).reading)
     except OtherJoints as error:
         add_not_asked(result, robot, engine, error)
     causes = [note.values["cause"] for note in result.notes if "cause" in note.values]
@@ -225,8 +225,8 @@ def test_a_cause_is_confirmed_by_the_engine_itself(kind, engine, text, ask, stat
 
 
 def test_each_cause_that_an_engine_can_have_has_a_script():
-    known = {(kind, engine) for engine, kinds in OF_ENGINES.items() for kind in kinds}
-    assert known == {(kind, engine) for kind, engine, *_ in CASES}
+    known = {(kind, label) for label, kinds in OF_ENGINES.items() for kind in kinds}
+    assert known == {(kind, RECORDS[engine].label) for kind, engine, *_ in CASES}
 
 
 @pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))

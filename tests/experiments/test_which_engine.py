@@ -137,7 +137,7 @@ def test_a_cause_is_named_where_the_engine_has_what_follows_from_it(tmp_path):
         reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": why,
                    "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
         result = EnginesResult("engines", tables={"engines_read": []})
-        compare_numbers(result, robot, RECORDS["drake"], reading)
+        compare_numbers(result, robot, RECORDS["newton"], reading)
         (cause,) = {row.cause for row in result.tables["engines_read"]}
-        named.append((cause, result.readers["Drake"].differing))
+        named.append((cause, result.readers["Newton"].differing))
     assert named == [("option_gravity gravity", ["refused", "gravity"]), (None, ["joints", "gravity"])]

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...core.words import some_of
-from ...engines import RECORDS, Array
+from ...engines import Array, EngineRecord
 from ...engines.mujoco import read
 from ...engines.mujoco.names import joint_places
 from ...engines.mujoco.source import ModelError, Source
@@ -107,12 +107,14 @@ class Entry(NamedTuple):
     bodies: tuple[str, ...]  # that move with that joint
 
 
-def causes_of(engine: str, file: File, reading: Reading, entries: Sequence[Entry]) -> dict[Entry, Cause]:
+def causes_of(
+    record: EngineRecord, file: File, reading: Reading, entries: Sequence[Entry]
+) -> dict[Entry, Cause]:
     """The causes of entries, as far as one is known: losses, each with those that were found before, then what else is seen."""
     origin, causes = origin_of(file), dict[Entry, Cause]()
     if origin.root.find("worldbody") is not None:
-        explain_by_losses(engine, origin, reading, entries, causes)
-    finds = [SEEN[kind] for kind in OF_ENGINES.get(engine, ()) if kind in SEEN]
+        explain_by_losses(record, origin, reading, entries, causes)
+    finds = [SEEN[kind] for kind in OF_ENGINES.get(record.label, ()) if kind in SEEN]
     for entry in [entry for entry in entries if entry not in causes]:
         subjects = {find.__name__: find(origin, reading, entry, entries) for find in finds}
         kind = next((kind for kind, subject in subjects.items() if subject), None)
@@ -121,15 +123,19 @@ def causes_of(engine: str, file: File, reading: Reading, entries: Sequence[Entry
     return causes
 
 
-def losses_of(engine: str) -> list[str]:
-    return [kind for kind in OF_ENGINES.get(engine, ()) if kind in LOSSES]
+def losses_of(record: EngineRecord) -> list[str]:
+    return [kind for kind in OF_ENGINES.get(record.label, ()) if kind in LOSSES]
 
 
 def explain_by_losses(
-    engine: str, origin: Origin, reading: Reading, entries: Sequence[Entry], causes: dict[Entry, Cause]
+    record: EngineRecord,
+    origin: Origin,
+    reading: Reading,
+    entries: Sequence[Entry],
+    causes: dict[Entry, Cause],
 ) -> None:
-    lost, is_new, eps = list[Loss](), True, RECORDS[engine].eps
-    known = losses_of(engine)
+    lost, is_new, eps = list[Loss](), True, record.eps
+    known = losses_of(record)
     while is_new and len(causes) < len(entries):
         is_new = False
         for kind in known:
@@ -172,10 +178,10 @@ def fits(reading: Reading, numbers: Mapping[str, Array], eps: float, entry: Entr
     return bool(not to_read[entry.place] and to_stated[entry.place] and not (to_stated & ~is_wrong).any())
 
 
-def joints_lost(engine: str, file: File, speeds: int) -> Cause | None:
+def joints_lost(record: EngineRecord, file: File, speeds: int) -> Cause | None:
     """Why an engine has this number of speeds, or None."""
     origin = origin_of(file)
-    for kind in losses_of(engine):
+    for kind in losses_of(record):
         changed, source = origin.without([LOSSES[kind]])
         if changed and (source.model.nv if source else 0) == speeds:
             return Cause(kind, some_of(changed))
@@ -255,19 +261,19 @@ SEEN = {find.__name__: find for find in (
     float32_meshes, small_inertia, oblique_turn, mass_of_meshes, turned_start, several_joints,
 )}  # fmt: skip
 FLOAT32 = float32_meshes.__name__
-# what is known of each engine, in the order in which it is tried
+# what is known of each engine, by its label, in the order in which it is tried
 OF_ENGINES: Mapping[str, Sequence[str]] = {
-    "drake": (
+    "Drake": (
         "class_without_joint", "no_springs", "springdamper", "armature_of_actuator", "passive_of_free",
         "armature_without_motor", "gravity_flag", "total_mass", "bounds", "groups", "shell_inertia", "frame", "replicate",
         FLOAT32, "mass_of_meshes", "several_joints",
     ),
-    "pinocchio": (
+    "Pinocchio": (
         "joint_pos_of_class", "armature_of_actuator", "option_gravity", "gravity_flag", "total_mass", "bounds", "groups",
         "geom_mass_of_class", "geoms_without_contacts", "fixed_root", "frame", "other_roots", "oblique_turn",
         "mass_of_meshes", "turned_start",
     ),
-    "newton": (
+    "Newton": (
         "springdamper", "armature_of_actuator", "passive_of_free", "option_gravity", "total_mass", "shell_inertia",
         "replicate", "small_inertia", "mass_of_meshes", "several_joints",
     ),
