@@ -92,6 +92,18 @@ def test_the_cheapest_method_is_that_of_the_engines_own_time():
     assert fields["within_1e_6"] is None and (fields["floor"], fields["floor_method"]) == (0.9e-3, "slow")
 
 
+@pytest.mark.parametrize(
+    "errors, is_floor", (((1e-3, 5e-4), False), ((1e-3, 6e-4), True), ((1e-6, 2e-6), True), ((1e-6,), False))
+)
+def test_a_floor_is_where_errors_fall_no_further(errors, is_floor):
+    """Else the smallest error is that of the last run; whether a finer one was left out is said of it."""
+    rows = [row("m", error, 1.0) for error in errors]
+    rows[-1].finer_left_out = True
+    fields = cheapest_of(rows, 1.0)
+    assert fields["floor"] == min(errors) and fields["floor_reached"] == is_floor
+    assert fields["finer_left_out"] == (not is_floor)
+
+
 def test_the_cheapest_engine_is_that_of_the_least_cost_among_those_that_reach_an_error():
     costs = {None: 1.0, "rk4": 3.0, "RK4": 2.0}
     rows = [SimpleNamespace(within_1e_3=name, within_1e_3_cost=cost) for name, cost in costs.items()]

@@ -10,6 +10,7 @@ from ...robots.case import Case
 from .tables import AnswerRow, EnginesResult, MethodRow
 
 TARGETS = {"1e_3": 1e-3, "1e_6": 1e-6, "1e_9": 1e-9}  # rad or m, the largest error of a motion
+FALLS = 1.8  # ratio of the errors of two runs of a method of order 1; a smaller one is that of a floor
 SAME, OTHER, NOT_SET = "same", "differs", "not set"  # verdicts on the equations
 
 
@@ -70,7 +71,12 @@ def cheapest_of(runs: Sequence[MethodRow], duration: float) -> Mapping[str, Any]
         fields[f"within_{name}"] = best and best.method
         fields[f"within_{name}_cost"] = best and 1e3 * best.own_seconds / duration
     least = min(ended, key=lambda row: row.worst_error or 0.0, default=None)
-    return fields | {"floor": least and least.worst_error, "floor_method": least and least.method}
+    fields |= {"floor": least and least.worst_error, "floor_method": least and least.method}
+    errors = [row.worst_error or 0.0 for row in ended if least and row.method == least.method]
+    fields["floor_reached"] = len(errors) > 1 and errors[-1] * FALLS > errors[-2]
+    return fields | {
+        "finer_left_out": any(row.finer_left_out for row in runs) and not fields["floor_reached"]
+    }
 
 
 def cheapest_engine(rows: Sequence[AnswerRow], name: str) -> tuple[AnswerRow, str, float] | None:
