@@ -9,7 +9,6 @@ from models import PATHS
 from compare.engines.mujoco import read
 from compare.robots.actuators import Actuator, Drive, controller, reason
 from compare.robots.file import robot_of
-from compare.robots.scene import WrongField
 
 SERVO = Actuator("servo", "b", (0.0, 2.0), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, -4.0))
 TENDON = Actuator("tendon", "a", (0.5, -0.7), gain=(30.0, 0.0, 0.0), bias=(1.0, -20.0, 0.0))
@@ -49,13 +48,3 @@ def test_which_actuators_take_part(changes, takes_part):
     assert (reason(one, 0.0) == "") is takes_part is bool(found.position_gain.any())
     assert set(found.left_out) == (set() if takes_part else {"servo"})
     assert (found.controls != (None,)) is takes_part
-
-
-@pytest.mark.parametrize("changes, field", [
-    ({"targets": 2.0}, "targets"), ({"targets": (2.0,)}, "targets"), ({"targets": (2.0, np.nan, 0.0, 0.0)}, "targets"),
-    ({"locked": ("wrist",)}, "locked"),
-])  # fmt: skip
-def test_what_cannot_be_a_scene_of_servos_is_refused(gripper, changes, field):
-    with pytest.raises(WrongField) as error:
-        gripper.case("mine", posture="open", torque="servos", **changes)
-    assert error.value.field == field and "\n" not in str(error.value)

@@ -1,7 +1,6 @@
 """What breaks inside a run is a failed check, and the rest goes on; what is timed comes last."""
 
 import json
-import os
 import sys
 from functools import partial
 from types import SimpleNamespace
@@ -109,13 +108,6 @@ def test_progress_counts_from_one():
     assert experiment.progress(clock, ["mass", "gravity", "speed"]) == []
     clock.under_way = "gravity"
     assert experiment.progress(clock, ["mass", "gravity", "speed"]) == ["2 of 3", "gravity"]
-
-
-def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):
-    made(monkeypatch, "broken", rows=lambda setup: list(setup.map(os._exit, [3])))
-    only(monkeypatch, "broken")
-    assert ran(tmp_path, "broken") == (2, None)
-    assert len(capsys.readouterr().err.splitlines()) == 1 and list(tmp_path.iterdir()) == []
 
 
 class Writing(InProcess):

@@ -12,7 +12,7 @@ from edited import XML, edited, setup_of, untimed_speed
 from compare.core.check import Result
 from compare.experiments import module, parameters, reduction, stability, trajectory
 from compare.robots.arm import ARM
-from compare.run.examine import Setup
+from compare.run.examine import Setup, in_one
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
@@ -204,6 +204,14 @@ IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3
 def test_numbers_that_are_wrong_together_are_one_cause(edits, text):
     (cause,) = found(edited(*edits))[1]
     assert cause.text == text and cause.place == text.partition(":")[0]
+
+
+def test_a_slip_that_explains_several_numbers_is_the_cause_in_their_place():
+    upper_arm = '<inertial pos="0 0 -0.15" mass="1.9" diaginertia="0.015 0.014 0.002"/>'
+    setup = setup_of(edited((upper_arm, "@"), (FOREARM, upper_arm), ("@", FOREARM)), states=20, make=Setup)
+    several = parameters.rows(setup).causes
+    (cause,) = in_one(setup, several)
+    assert len(several) == 3 and cause.place == "masses, CoMs and inertias of upper arm and forearm"
 
 
 def test_what_is_wrong_for_another_reason_stays_another_cause():

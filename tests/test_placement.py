@@ -111,14 +111,6 @@ def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
     assert placed(tree, read(wrist).tree).is_same
 
 
-def test_bodies_stay_one_where_joints_are_locked(tmp_path):
-    (tmp_path / "file.xml").write_text(edited((FOREARM, SPLIT)))
-    compared = compared_with("arm", str(tmp_path / "file.xml"))
-    case = compared.robot.case(locked=("alpha", "gamma"))
-    q = STATES[0][:, 1:2]
-    assert np.abs(compared.mujoco.of(case).mass_matrix(q) - tmt.mass_matrix(q, case.tree)).max() < 1e-14
-
-
 def test_locked_joints_make_no_contacts_that_the_file_does_not_have():
     """Of neighbours of which one stands still; others stay."""
     capsule = '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>'

@@ -99,11 +99,7 @@ class Comparison:
         self.take_random(states, seed)
 
     def read(self, mjcf: Any) -> None:
-        from ..engines.mujoco import (
-            engine,
-            read,
-            tree_with_sites,
-        )  # here, so that `import compare` need not wait for it
+        from ..engines.mujoco import engine, read, tree_with_sites  # here: `import compare` need not wait
 
         self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
         self.robot = robot_of(self.reading, "the model")

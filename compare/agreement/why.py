@@ -1,7 +1,7 @@
 """The probable cause of a difference: in Mbar and h, or in the accelerations alone."""
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -143,13 +143,10 @@ def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -
 
 def of_inputs(asked: Asked, factors: ndarray, left_over: LeftOver) -> Why:
     """Torques that act with other factors, and what else acts; left_over: with these factors."""
-    wrong = [
-        (asked.coordinates.speeds[i], float(x)) for i, x in enumerate(factors) if abs(x - 1.0) > CONSTANT
-    ]
-    causes = tuple(
-        Cause(rank=2, kind="input", place=f"tau of {name}", stated=1.0, explains=x, unit="times")
-        for name, x in wrong
-    )
+    named = zip(asked.coordinates.speeds, factors.tolist())
+    wrong = [(name, x) for name, x in named if abs(x - 1.0) > CONSTANT]
+    about: dict[str, Any] = {"rank": 2, "kind": "input", "stated": 1.0, "unit": "times"}
+    causes = tuple(Cause(place=f"tau of {name}", explains=x, **about) for name, x in wrong)
     text = say(Finding("agreement", "inputs", {"factors": wrong}))
     is_found = left_over.ratio <= 1.0 or bool(left_over.causes)
     return Why(f"{text} {left_over.sentence()}".rstrip(), is_found, causes + left_over.causes)

@@ -198,9 +198,8 @@ class Entries:
         nv = self.qd.shape[1]
         rates, sizes = np.zeros((2, len(self.q), 3 * nv, 3 * nv))
         rates[:, :nv, nv : 2 * nv] = np.eye(nv)
-        sizes[:, :nv, nv : 2 * nv] = np.equal.outer(
-            self.of_speed, self.of_speed
-        )  # turns of a ball add to each other
+        # turns of a ball add to each other
+        sizes[:, :nv, nv : 2 * nv] = np.equal.outer(self.of_speed, self.of_speed)
         rates[:, nv : 2 * nv] = np.abs(np.concatenate(by[:3], axis=2))
         sizes[:, nv : 2 * nv] = np.concatenate(scale[:3], axis=2)
         carried = term = np.broadcast_to(np.eye(3 * nv), rates.shape)

@@ -21,7 +21,7 @@ from .scene import Scene
 Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
-MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time where it is compared
+MOST_ENTRIES = 1_400_000  # of all Jacobians of a run, which take the time where it is compared
 COARSER = 4  # largest step / step of the file
 OWN_POSTURES = "qpos0", "middle"  # their names
 SAME_POSTURE = 1e-9  # rad or m
@@ -77,10 +77,8 @@ def robot_of_solution(file: RobotFile, shown: str, solution: RobotFile, whose: s
 
 def not_compared(file: RobotFile, solution: RobotFile, names: Sequence[str]) -> list[Finding]:
     """The limits and actuators that are not those of a solution. names: its joints as in the file."""
-    ranges, called = (
-        dict(zip(file.tree.joint_names, file.ranges)),
-        dict(zip(solution.tree.joint_names, names)),
-    )
+    ranges = dict(zip(file.tree.joint_names, file.ranges))
+    called = dict(zip(solution.tree.joint_names, names))
     limits = [name for name, limit in zip(names, solution.ranges) if rounded(ranges[name]) != rounded(limit)]
     laws, stated = laws_of(file.drive, {}), laws_of(solution.drive, called)
     actuators = [name for law, name in (laws | stated).items() if law not in laws or law not in stated]

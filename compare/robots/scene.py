@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from tmt.model.values import real_numbers, shown
+
 SEED = 10  # of every random number in a report
 MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
 TIMES = 1e-9, 1e6  # s, the shortest and the longest that is accepted
@@ -16,18 +18,14 @@ class WrongField(ValueError):
     """A field of a scene has a wrong value. accepted: what is expected instead."""
 
     def __init__(self, scene: object, field: str, value: object, accepted: str):
-        named, shown = (shorten(" ".join(repr(part).split())) for part in (scene, value))
-        super().__init__(f"scene {named}: {field} is {shown}; expected {accepted}")
+        super().__init__(f"scene {shown(scene)}: {field} is {shown(value)}; expected {accepted}")
         self.field, self.value, self.accepted = field, value, accepted
 
 
 def is_number(value: object) -> bool:
     """Whether a value is a finite real number; texts and booleans are not."""
-    try:
-        number = np.asarray(value)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
+    number = real_numbers(value)
+    return number is not None and number.ndim == 0 and bool(np.isfinite(number))
 
 
 def are_numbers(values: Any) -> bool:
@@ -39,10 +37,6 @@ def are_numbers(values: Any) -> bool:
 def is_each(value: Any) -> bool:
     """Whether a value is a number, or a sequence of numbers that is not empty."""
     return is_number(value) or (are_numbers(value) and np.size(value) > 0)
-
-
-def shorten(text: str, length: int = 60) -> str:
-    return text if len(text) <= length else text[: length - 4] + " ..."
 
 
 @dataclass(frozen=True)

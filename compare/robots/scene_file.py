@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from .case import Case, Robot
-from .scene import Scene, WrongField, are_numbers, is_number, shorten
+from .scene import Scene, WrongField, are_numbers, is_number
 
 KEYS = (
     "name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt"
 )  # fmt: skip
 STEPS = 64  # of a scene without dt
+LONGEST = 56  # text of a value in a message
 NEARLY_ONE = 1e-3  # accepted deviation of the length of a quaternion from 1, for few digits
 
 
@@ -129,5 +130,6 @@ def with_unit_quaternions(name: object, q: Any, robot: Robot) -> Any:
 
 
 def shown(value: object) -> str:
-    """A value in one line, shortened."""
-    return shorten(json.dumps(value, ensure_ascii=False, default=str))
+    """A value in one line, as TOML has it, shortened."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."

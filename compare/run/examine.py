@@ -15,7 +15,7 @@ from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
-from ..process.workers import Clock, WorkerEnded, load_modules
+from ..process.workers import Clock, WorkerEnded, Workers, load_modules
 from ..report.terminal import Terminal
 from ..report.verdict import Figure, Section, failures
 from ..robots import Robot
@@ -69,7 +69,7 @@ class Run:
     setup: Setup
     folder: Path  # for the folder of figures
     terminal: Terminal
-    workers: Executor
+    workers: Executor | Workers
     clock: Clock = field(default_factory=Clock)
     sections: list[Section] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)

@@ -28,8 +28,8 @@ def kept(
         if content is not None:
             with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
                 return list(arrays.values())
-    arrays, content = list(compute()), io.BytesIO()
-    np.savez(content, *arrays)
+    arrays, file = list(compute()), io.BytesIO()
+    np.savez(file, *arrays)
     with suppress(OSError):
-        store.write_aside(path, store.digest(path, content.getvalue()) + content.getvalue())
+        store.write_aside(path, store.digest(path, file.getvalue()) + file.getvalue())
     return arrays

@@ -8,7 +8,7 @@ from files import STL
 import tmt
 from compare.engines import RECORDS
 from compare.engines.outside import Outside
-from compare.engines.outside.file import OtherJoints, Unread, Unwritten
+from compare.engines.outside.file import OtherJoints, Unread
 from compare.experiments.engines import add_not_asked, names_of_free
 from compare.experiments.engines.causes import OF_ENGINES
 from compare.experiments.engines.readings import compare_numbers
@@ -256,21 +256,6 @@ def test_a_refusal_is_that_of_the_engine_and_not_credited_with_the_copy(engine, 
         assert reading["copied"] is None
 
 
-def test_pinocchio_has_no_springs_and_applies_no_damping(tmp_path):
-    skip_unless_installed("pinocchio")
-    import pinocchio as pin
-
-    path = file_of(tmp_path, ARM.format("", '<joint name="j" axis="0 1 0" stiffness="9" damping="2"/>', ""))
-    model, accelerations = pinocchio(path), []
-    for damping in (0.0, 5.0):
-        model.damping = np.array([damping])
-        state = np.array([0.5]), np.array([1.0]), np.zeros(1)
-        accelerations.append(pin.aba(model, model.createData(), *state))
-    assert accelerations[0] == accelerations[1] and not any("stiffness" in name for name in dir(model))
-    reading = Outside("pinocchio").of(compared_with("model", str(path)).robot.case()).reading
-    assert reading["lacking"] == ("damping", "stiffness") and "stiffness" not in reading["read"]
-
-
 @pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
 def test_masses_and_a_gravity_that_were_read_otherwise_are_set(engine, tmp_path):
     skip_unless_installed(engine)
@@ -339,36 +324,3 @@ def test_pinocchio_applies_the_armature_of_a_free_body_to_its_own_speeds(tmp_pat
         assert np.allclose(moved, data.qacc[:3]) == is_same
         robot = compared_with("model", str(path)).robot
         assert names_of_free(robot) == [] if is_same else ["b"]
-
-
-BALL = ARM.format("", '<joint name="j" type="ball"/>', "")
-BESIDE = f"""<mujoco><worldbody><body><freejoint name="f"/>{INERTIAL.format("0 0 1")}</body>
-<body>{HINGE}{INERTIAL.format("0 0 1")}</body></worldbody></mujoco>"""
-
-
-def test_a_limit_of_this_program_is_said_as_such(tmp_path):
-    """PyBullet could load two robots; a URDF has no ball joints, no armature of free ones: neither is called a refusal."""
-    skip_unless_installed("pybullet")
-    for text in (BESIDE, BALL, FREE.replace("damping", "armature")):
-        robot = compared_with("model", str(file_of(tmp_path, text))).robot
-        with pytest.raises(Unwritten):
-            Outside("pybullet").of(robot.case()).reading  # noqa: B018
-
-
-def test_pybullet_takes_angles_of_a_quaternion_about_the_bodys_own_axes(tmp_path):
-    """Gravity on a body that is turned: its inverse dynamics has it right for the quaternion that is converted only."""
-    skip_unless_installed("pybullet")
-    import pybullet
-    from scipy.spatial.transform import Rotation
-
-    pybullet.connect(pybullet.DIRECT)
-    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-    (tmp_path / "b.urdf").write_text(f'<robot name="r"><link name="b">{inertial}</link></robot>')
-    body = pybullet.loadURDF(str(tmp_path / "b.urdf"))
-    pybullet.setGravity(0, 0, -9.81)
-    turn, converted = (Rotation.from_euler(axes, [0.4, 0.5, 0.6]) for axes in ("XYZ", "xyz"))
-    for quaternion, is_right in ((turn, False), (converted, True)):
-        state = [0.0, 0.0, 0.0, *quaternion.as_quat()], [0.0] * 6, [0.0] * 6
-        force = pybullet.calculateInverseDynamics(body, *state)[:3]  # linear first
-        assert np.allclose(force, turn.inv().apply([0.0, 0.0, 9.81])) == is_right
-    pybullet.disconnect()

@@ -88,18 +88,6 @@ def assert_locked(reading, names, rng):
     return dynamics
 
 
-def test_a_file_with_every_kind_of_joint():
-    reading = read(PATHS["mixed"])
-    tree = reading.tree
-    assert ", ".join(tree.joint_names[:7]) == "track, swing, joint 2, base x, base y, base z, base turn"
-    assert tree.body_names == ("carriage", "body 3", "base", "tail", "tip", "leg", "foot")
-    assert tree.parent == (-1, 0, 1, -1, 3, 4, 5, 6, 6, 8, 9)
-    assert np.allclose(tree.rest[:10], [0.05, 0.0, 0.6, *reading.qpos0[3:10]])  # a free base has no spring
-    assert reading.ranges == ((-1.0, 1.0), *[None] * 8, (-2.0, 2.0), None)
-    assert (reading.integrator, reading.dt, reading.warnings) == ("Euler", 0.002, ())
-    assert [f.feature for f in reading.features] == OF_MIXED
-
-
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):

@@ -63,8 +63,3 @@ def test_a_process_that_is_killed_while_it_is_idle_is_replaced():
         os.kill(workers.submit(os.getpid).result(SOON), signal.SIGKILL)
         time.sleep(5 * LONG)
         assert workers.submit(abs, -4).result(SOON) == 4
-
-
-def test_what_cannot_be_sent_is_raised():
-    with closing(Workers(1, Beginning())) as workers, pytest.raises((AttributeError, TypeError)):
-        workers.submit(lambda: 4).result(SOON)

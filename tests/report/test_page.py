@@ -5,15 +5,13 @@ import re
 import subprocess
 from dataclasses import replace
 
-import numpy as np
 import pandas as pd
 import pytest
 from matplotlib.figure import Figure as Drawing
-from PIL import Image
 from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
-from compare.report import images, provenance, style
+from compare.report import images, provenance
 from compare.report.document import Document
 from compare.report.files import write
 from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
@@ -140,28 +138,6 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     failed = [check for check in results["checks"] if not check["passed"]]
     assert results["passed"] is False and {check["experiment"] for check in failed} == {"report"}
     assert len(failed) == len(whys) and len(results["causes"]) == 1
-
-
-def pixels(source):
-    with Image.open(source) as image:
-        return np.asarray(image.convert("RGB"), dtype=int)
-
-
-def test_a_figure_is_small_and_its_colours_are_not_visibly_changed(tmp_path):
-    chart = Drawing(figsize=(4, 3), dpi=100)
-    axes = chart.subplots()
-    axes.set_facecolor("#f9f9f9")  # nearly as white as the paper
-    for k in range(9):
-        axes.plot(np.sin(np.linspace(0, 9, 400) + k), color=(style.BLUE, style.RED)[k % 2], linewidth=3)
-    chart.savefig(tmp_path / "whole.png")
-    images.save_figure(chart, tmp_path / "few.png")
-    whole, few = pixels(tmp_path / "whole.png"), pixels(tmp_path / "few.png")
-    off = np.abs(whole - few).max(axis=2)
-    assert whole.shape == few.shape and off.mean() < 3 and np.mean(off > 24) < 0.005
-    paper = (whole == 255).all(axis=2)
-    assert paper.sum() > 9999 and (few[paper] == 255).all()
-    sizes = [(tmp_path / name).stat().st_size for name in ("few.png", "whole.png")]
-    assert sizes == sorted(sizes)
 
 
 def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from sections import BAD, GOOD, section
 from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.finding import Finding
-from compare.experiments import module, stability
+from compare.experiments import module
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import conclusions
@@ -21,7 +21,7 @@ from compare.experiments.stability.tables import LimitRow, StabilityResult
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers
-from compare.report.style import BLUE, ORANGE, RED
+from compare.report.style import BLUE, ORANGE
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
 from compare.run.examine import say_outcome, section_with
@@ -218,14 +218,3 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
     assert conclusions.cheapest_settings(result)["settings"] == [rows[-2], rows[2]]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
-
-
-def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
-    row = replace(STEP, damping=0.5)
-    schemes = {("tmt", "rk4"): "rk4", ("mujoco", "RK4"): "rk4"}
-    mujoco = replace(row, engine="mujoco", method="RK4", observed_dt=0.0995, passed=False)
-    rows = [row, mujoco, replace(row, scene="saddle")]
-    result = StabilityResult("stability", rows=rows, centres=("s",), schemes=schemes)
-    values = stability.headline(result).values
-    assert values == {"limits": 2, "known": 2, "wrong": 1, "off": pytest.approx(0.005)}
-    assert {("o", to_hex(BLUE), 0.1001), ("X", to_hex(RED), 0.0995)} <= marks("stability", result)

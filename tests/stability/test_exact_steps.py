@@ -3,13 +3,13 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-import mujoco
 import numpy as np
 import pytest
 from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, sphere
 
 from compare.engines.mujoco.forces import forces_near
 from compare.engines.mujoco.names import INTEGRATORS
+from compare.engines.mujoco.step import REMEMBERED
 from compare.stability.closed_form import matrix, radius_apart
 from compare.stability.growth import growth
 
@@ -74,11 +74,16 @@ def test_limits_of_one_hinge_are_those_of_the_formula():
     assert limit_of(hinge(actuator=exactly), "implicitfast").dt > 0.05
 
 
-@pytest.mark.skipif(not hasattr(mujoco.MjModel, "nhistory"), reason="this MuJoCo knows no delays")
-def test_a_delay_of_constant_controls_changes_no_limit():
+@pytest.mark.skipif(not REMEMBERED, reason="this MuJoCo knows neither delays nor springs that yield")
+def test_a_delay_of_constant_controls_and_springs_that_do_not_yield_change_no_limit():
     servo = '<position joint="turn" kp="20" kv="1"{}/>'
-    prompt, late = (hinge(actuator=servo.format(more)) for more in ("", ' delay="0.004" nsample="4"'))
-    assert limit_of(late, "implicitfast").dt == pytest.approx(limit_of(prompt, "implicitfast").dt)
+    late, plain = (hinge(actuator=servo.format(more)) for more in (' delay="0.004" nsample="4"', ""))
+    spring = 'stiffness="3" springref="20"'
+    yielding, elastic = (
+        plain.replace('name="turn"', f'name="turn" {spring}{more}') for more in (' springyield="9"', "")
+    )
+    for text, same in ((late, plain), (yielding, elastic)):
+        assert limit_of(text, "implicitfast").dt == pytest.approx(limit_of(same, "implicitfast").dt)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -63,15 +63,6 @@ def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_cha
 
 
 @of_trees
-def test_gravity_and_springs_are_the_slope_of_the_potential_energy(drawn):
-    tree, q, qd, *_ = drawn
-    held = tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree)
-    slope = by_each(tree, lambda q: tmt.potential_energy(q, tree), q)
-    assert_close(slope, held, 1.0 + abs(tmt.potential_energy(q, tree)))
-    assert_close(tmt.bias(q, 0.0 * qd, tree), tmt.gravity_balance(q, tree), 100.0, 64 * EPS)
-
-
-@of_trees
 def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
     tree, q, qd, *_ = drawn
 

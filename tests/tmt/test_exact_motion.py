@@ -88,16 +88,6 @@ def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
         assert off(path, [*position, *quaternion, *speed, *omega], k) < 1e-29
 
 
-def test_times_are_exact_multiples_of_the_step():
-    """A slide without force moves by speed times time: 0.1, 0.3, 0.7 are not what their doubles are."""
-    tree = one_body([(0.0, 1.0, 0.0)], ["slide"], gravity=(0.0, 0.0, 0.0))
-    path = trajectory(tree, [0.3], [0.7], [0.0], 0.1, 21, every=3)
-    assert path.high.shape == (8, 2) and path.steps == 1
-    for k, (high, low) in enumerate(zip(path.high[:, 0].tolist(), path.low[:, 0].tolist())):
-        expected = Fraction(0.3) + Fraction(0.7) * 3 * k * Fraction(0.1)
-        assert abs(Fraction(high) + Fraction(low) - expected) < Fraction(1, 10**31)
-
-
 @pytest.mark.parametrize("tree", [small_tree(), tree_of_kinds(np.random.default_rng(1), bodies=1)])
 def test_trees_of_every_kind_beside_a_short_run_in_many_digits(tree, rng):
     """Balls, slides and free joints, springs, armature, damping, axes to the last digit, a controller."""

@@ -12,11 +12,9 @@ from many_digits import FIELDS, exact
 from trees import random_states, random_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import straight
 from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.exact.many import Pairs, exact_of_many
 from tmt.export import c
-from tmt.export.statements import Syntax, Writer
 
 HAS_C = bool(shutil.which("gcc"))
 
@@ -53,29 +51,6 @@ def test_python_gives_the_same_values(tree, name):
     states = states_of(tree)[: len(QUANTITIES[name].takes)]
     found, expected = module(tree, name)[name](*states), getattr(tmt, name)(*states, model=tree)
     assert near(*((x if isinstance(x, tuple) else (x,)) for x in (found, expected)))
-
-
-def test_python_takes_any_batch_and_refuses_other_shapes():
-    found = module(tmt.ARM, "bias")["bias"]
-    q, qd = np.linspace(-1.0, 1.0, 12).reshape(2, 2, 3), np.array([0.1, 0.2, 0.3])
-    assert near([found(q, qd)], [tmt.bias(q, qd)]) and found(q[0, 0], qd).shape == (3,)
-    with pytest.raises(ValueError, match="expected"):
-        found(q[..., :2], qd)
-
-
-def test_brackets_keep_the_order_of_operations():
-    def function(x):
-        a, b, c, d = x
-        return [a - (b - c), a / (b * c), a / (b / c), (a - b) * (c - d), -(a * b) - c, -(a - b), (a + b) / (c + d),
-                a * (b + c) - d * (a - c), -2.0 * a - -3.0 / b, 1.0 / (a - b)]  # fmt: skip
-
-    traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
-    for number in (repr, lambda x: f"({x!r})"):
-        syntax, names = Syntax("", "{name} = {value}", "", number=number), dict(zip("abcd", values))
-        results = [f"out[{k}] = {{value}}" for k in range(len(traced.outputs))]
-        names["out"] = [None] * len(results)
-        exec("\n".join(line.text for line in Writer(traced, "abcd", results, syntax).lines), {}, names)
-        assert np.allclose(names["out"], function(values), rtol=1e-14)
 
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")

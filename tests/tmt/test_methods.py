@@ -50,16 +50,6 @@ def test_methods_keep_their_order_with_balls():
         assert abs(np.log2(error(name, 8) / error(name, 16)) - order) < 0.4
 
 
-def test_an_adaptive_method_keeps_to_its_tolerance():
-    _, *exact = tmt.simulate(BENT, REST, REST, 1 / 4096, 4096, "dopri8")
-    errors = []
-    for tolerance in (1e-4, 1e-8, 1e-12):
-        _, *path = tmt.simulate(BENT, REST, REST, 0.25, 4, "dopri8_adaptive", tolerance=tolerance)
-        errors.append(max(np.abs(a[-1] - b[-1]).max() for a, b in zip(path, exact)))
-        assert 0.0 < errors[-1] < 100 * tolerance
-    assert errors[0] > 1e6 * errors[-1]
-
-
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
     tmt.ARM, parent=(-1, 0, 0), damping=(0.1, 0.0, 0.2), stiffness=(0.0, 3.0, 0.0), armature=(0.0, 0.1, 0.0),
     reference=(0.2, 0.0, -0.3),

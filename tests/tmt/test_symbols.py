@@ -91,16 +91,6 @@ def test_a_double_pendulum_has_the_form_of_textbooks():
     assert symbols.parameters[l1] == (0.5, "m", "from joint0 to joint1, along -z")
 
 
-def test_rounding_of_a_compiled_model_makes_no_terms(rng):
-    """Axes and offsets that are a few eps off."""
-    tree, clean = planar(3), symbolic(planar(3))
-    offset, axis = np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16]
-    noisy = replace(tree, offset=offset, axis=axis, com=np.array(tree.com) + 1e-17)
-    symbols = symbolic(noisy)
-    assert symbols.entries == clean.entries and symbols.parameters == clean.parameters
-    assert_right(symbols, noisy, rng)
-
-
 def test_a_large_robot_has_numbers_and_says_so(rng, monkeypatch):
     monkeypatch.setattr(trigonometry, "LARGEST_PRODUCT", 100)
     tree = tree_of("arm6").lock({"roll": 0.0, "pitch": 0.3, "flange": 0.0})

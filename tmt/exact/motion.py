@@ -71,9 +71,11 @@ def truth(
 
     The two share neither the order nor, up to 40 speeds, the form of the equations.
     """
-    first = trajectory(tree, q, qd, tau, dt, steps, every)
     form = "literal" if len(qd) <= MOST_LITERAL else "composite"
-    second = trajectory(tree, q, qd, tau, dt, steps, every, form, OTHER_ORDER)
+    second = trajectory(
+        tree, q, qd, tau, dt, steps, every, form, OTHER_ORDER
+    )  # which would take too long sooner
+    first = trajectory(tree, q, qd, tau, dt, steps, every)
     return first, float(np.abs((first.high - second.high) + (first.low - second.low)).max())
 
 

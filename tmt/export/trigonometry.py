@@ -14,7 +14,8 @@ NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
 # work, s of a core of 2026: of a product, of each of its pairs of terms, of a term whose form is sought
 OF_PRODUCT, OF_PAIR, OF_TERM = 4e-4, 4e-6, 1e-3
-Polynomial = Expression = Any  # of SymPy
+Polynomial = Any  # of SymPy
+Expression = Any  # of SymPy
 
 
 class TooLong(Exception):

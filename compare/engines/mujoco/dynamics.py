@@ -170,9 +170,8 @@ class MujocoDynamics:
     def additional_bodies(self) -> list[tuple[str, float]]:
         """Bodies with mass, kg, that are not among those of the case, by name."""
         others = np.setdiff1d(np.flatnonzero(self.model.body_mass), self.bodies)
-        return [
-            (element_name(self.model, "body", body), float(self.model.body_mass[body])) for body in others
-        ]
+        masses = self.model.body_mass[others].tolist()
+        return [(element_name(self.model, "body", body), mass) for body, mass in zip(others, masses)]
 
     @property
     def may_touch(self) -> bool:

@@ -47,7 +47,7 @@ def rows(step: Step, on: np.ndarray) -> Rows | None:
     if mujoco.mj_isSparse(m):
         mujoco.mju_sparse2dense(J, d.efc_J, d.efc_J_rownnz, d.efc_J_rowadr, d.efc_J_colind)
     else:
-        J[:] = d.efc_J.reshape(J.shape)
+        J[:] = d.efc_J[: J.size].reshape(J.shape)  # it has room for rows that turned out to be empty
     contact = np.where(d.efc_type >= CONTACTS, d.efc_id, -1)
     return Rows(J[on], d.efc_R[on].copy(), d.efc_aref[on].copy(), d.efc_force[on].copy(), contact[on])
 

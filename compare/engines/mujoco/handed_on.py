@@ -122,9 +122,8 @@ class Bare:
     engaged = Engaged()
 
     def __init__(
-        self, source: Source, names: Sequence[str], rotors_in_joints: bool = False,
-        controller: Controller | None = None,
-    ):  # fmt: skip
+        self, source: Source, names: Sequence[str], rotors_in_joints: bool, controller: Controller | None
+    ):
         m = self.model = source.without({}, bare=controller is None)
         switch_off(m)
         # MuJoCo Warp refuses the first; with the second its implicitfast is explicit in the damping

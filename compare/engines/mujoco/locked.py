@@ -33,9 +33,8 @@ def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
     model.body_inertia[model.body_inertia == LEAST] = 0.0
     mujoco.mj_setConst(model, mujoco.MjData(model))
     if empty := [int(body) for body in model.jnt_bodyid if not model.body_subtreemass[body]]:
-        raise ValueError(
-            f"{element_name(model, 'body', empty[0])} moves, and neither it nor what it carries has mass"
-        )
+        name = element_name(model, "body", empty[0])
+        raise ValueError(f"{name} moves, and neither it nor what it carries has mass")
     return model
 
 

@@ -138,9 +138,8 @@ class Simulation:
     def __call__(self) -> list[Path]:
         nq, nv, paths = self.model.nq, self.model.nv, []
         for start, inputs in self.runs:
-            states, _ = rollout.rollout(
-                self.model, self.data, start, inputs[None], control_spec=INPUTS, nstep=len(inputs)
-            )
+            options = {"control_spec": INPUTS, "nstep": len(inputs)}
+            states, _ = rollout.rollout(self.model, self.data, start, inputs[None], **options)
             path = np.vstack([start, states[0]])[:, : 1 + nq + nv]
             failed = np.cumsum(~(np.diff(path[:, 0], prepend=-1.0) > 0.0)) > 0  # its clock stands still
             path[failed] = np.nan

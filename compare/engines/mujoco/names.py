@@ -14,10 +14,8 @@ from ...robots.coordinates import FREE, Coordinates
 
 Integer = int | np.integer[Any]
 # those that the installed version has; discrete came with 3.13
-MEMBERS = {
-    name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None)
-    for name in ("Euler", "implicitfast", "discrete", "implicit", "RK4")
-}
+NAMES = "Euler", "implicitfast", "discrete", "implicit", "RK4"
+MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None) for name in NAMES}
 INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
@@ -128,11 +126,6 @@ def aligns(joint: mujoco.MjsJoint) -> bool:
     is_left = joint.align == options.mjALIGNFREE_AUTO and bool(joint.compiler.alignfree)
     is_free = joint.type == mujoco.mjtJoint.mjJNT_FREE
     return bool(is_free and (is_left or joint.align == options.mjALIGNFREE_TRUE))
-
-
-def has_transition(m: mujoco.MjModel, integrator: str) -> bool:
-    """Whether mjd_transitionFD differentiates its step; nhistory: numbers that delays keep."""
-    return integrator != "RK4" and not getattr(m, "nhistory", 0)
 
 
 def number_of_actuators(m: mujoco.MjModel) -> int:

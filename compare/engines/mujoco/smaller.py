@@ -14,7 +14,7 @@ from .changed import state_as_compiled
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Source, is_from_geoms
+from .source import Source, delete_textures, is_from_geoms
 from .variants import of_base
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
@@ -22,7 +22,7 @@ NAMED = {  # the elements that are known by their names, and their kinds in a co
     "equalities": "equality", "sites": "site", "bodies": "body",
 }  # fmt: skip
 OFF = int(mujoco.mjtLimited.mjLIMITED_FALSE)
-DRAWN = "skins", "lights", "cameras", "textures"
+DRAWN = "skins", "lights", "cameras"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
 
 
@@ -94,11 +94,8 @@ def assets_of(path: File) -> File:
 
 def drawing(small: Smaller, use: Use) -> int:
     """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, meshes."""
-    for material in small.spec.materials:
-        material.textures = [""] * len(material.textures)
-    return touchless(small, lambda geom: not (geom.contype or geom.conaffinity)) + sum(
-        small.delete(elements, lambda _: True) for elements in DRAWN
-    )
+    count = delete_textures(small.spec) + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
+    return count + touchless(small, lambda geom: not (geom.contype or geom.conaffinity))
 
 
 def touchless(small: Smaller, is_needless: Callable[[mujoco.MjsGeom], bool]) -> int:
@@ -128,13 +125,12 @@ def tendons(small: Smaller, use: Use) -> int:
 
 def limits(small: Smaller, use: Use) -> int:
     """Limits of joints and tendons that never act; their ranges stay, as a servo may have the same."""
-    count = 0
-    for elements, kind in (("joints", "joint"), ("tendons", "tendon")):
-        limited = getattr(small.model, "jnt_limited" if kind == "joint" else "tendon_limited")
-        for element in getattr(small.spec, elements):
-            if limited[element.id] and element.name not in use.acted[kind]:
-                element.limited, count = OFF, count + 1
-    return count
+    model, acted = small.model, use.acted
+    ends = [x for x in small.spec.joints if model.jnt_limited[x.id] and x.name not in acted["joint"]]
+    ends += [x for x in small.spec.tendons if model.tendon_limited[x.id] and x.name not in acted["tendon"]]
+    for element in ends:
+        element.limited = OFF
+    return len(ends)
 
 
 def stages(small: Smaller, use: Use) -> int:

@@ -270,7 +270,18 @@ def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
     spec = stated.copy()
     spec.compiler.fusestatic = False  # fused bodies would only be renumbered
     spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or is_from_geoms(spec))
+    delete_textures(spec)
     return spec
+
+
+def delete_textures(spec: mujoco.MjSpec) -> int:
+    """Delete all textures, which are large in each copy of a model; how many there were."""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    textures = list(spec.textures)
+    for texture in textures:
+        spec.delete(texture)
+    return len(textures)
 
 
 def is_from_geoms(spec: mujoco.MjSpec) -> bool:

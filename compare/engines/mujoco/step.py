@@ -12,10 +12,12 @@ import mujoco
 import numpy as np
 
 from ...robots.actuators import Drive
-from .names import INTEGRATORS, bit, element_name, has_transition, number_of_actuators, output_of, set_control
+from .names import INTEGRATORS, bit, element_name, number_of_actuators, output_of, set_control
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
+# what delays and yielding springs remember
+REMEMBERED = sum(int(getattr(mujoco.mjtState, f"mjSTATE_{part}", 0)) for part in ("HISTORY", "PLASTIC"))
 TOLERANCE, ITERATIONS, LINE_SEARCH = 1e-15, 200, 100  # of MuJoCo's solver: the force of constraints, exactly
 NUDGE = 1e-7  # rad, m and their rates: of central differences
 LITTLE = 1e-6  # of an activation at the start of a run that is pushed
@@ -25,6 +27,11 @@ BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS",
 Act = Callable[[int], None]  # before a step of a run, by its number
 # of models, which are not changed afterwards, for their steps; as long as they are in use
 copies: WeakKeyDictionary[mujoco.MjModel, mujoco.MjModel] = WeakKeyDictionary()
+
+
+def takes_transition(model: mujoco.MjModel, integrator: str) -> bool:
+    """Whether mjd_transitionFD is right: it refuses RK4 and delays, and where springs yield it leaves what has yielded."""
+    return integrator != "RK4" and not mujoco.mj_stateSize(model, REMEMBERED)
 
 
 class Step:
@@ -89,12 +96,12 @@ class Step:
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
         """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`.
 
-        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4, delays nor the ends of a range of
+        MuJoCo's mjd_transitionFD is the same and faster, but does not have the ends of a range of
         activations.
         """
         sides, columns = self.sides(state, nudge), list[np.ndarray]()
-        has_function = has_transition(self.model, self.integrator)
-        if has_function and all(ahead.any() and behind.any() for ahead, behind in sides):
+        is_taken = takes_transition(self.model, self.integrator)
+        if is_taken and all(ahead.any() and behind.any() for ahead, behind in sides):
             A = np.zeros((self.size, self.size))
             self.put(state)
             mujoco.mjd_transitionFD(self.model, self.data, nudge, True, A, None, None, None)
@@ -138,7 +145,7 @@ class Step:
         speed = self.data.actuator_velocity
         return np.array([servo.force(length[servo.output], speed[servo.output]) for servo in servos])
 
-    def by_control(self, state: np.ndarray, controls: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
+    def by_control(self, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
         """The derivative of a step by some of the controls, (n, k)."""
 
         def pushed(control: int, by: float) -> np.ndarray:
@@ -146,7 +153,7 @@ class Step:
             self.data.ctrl[control] += by
             return self.after(self.state())
 
-        columns = [(pushed(k, nudge) - pushed(k, -nudge)) / (2.0 * nudge) for k in controls.tolist()]
+        columns = [(pushed(k, NUDGE) - pushed(k, -NUDGE)) / (2.0 * NUDGE) for k in controls.tolist()]
         return np.array(columns).reshape(-1, self.size).T
 
     def run(self, state: np.ndarray, steps: int, act: Act = lambda step: None) -> Iterator[mujoco.MjData]:
@@ -219,13 +226,9 @@ def whole_run(
 
 
 def start_of(
-    model: mujoco.MjModel,
-    drive: Drive,
-    key: str,
-    push: np.ndarray,
-    q: np.ndarray | None = None,
+    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None,
     controls: Sequence[float | None] = (),
-) -> np.ndarray:
+) -> np.ndarray:  # fmt: skip
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) added to its speeds.
 
     q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.

@@ -100,9 +100,8 @@ class OwnDynamics(OneByOne):
             states = [course.start]
             with np.errstate(all="ignore"):  # a run may diverge
                 while len(states) <= course.steps and np.isfinite(states[-1]).all():
-                    q, v = stepped(
-                        scheme, self.tree, slope, [*states[-1][:nq]], [*states[-1][nq:]], course.dt
-                    )
+                    q, v = list(states[-1][:nq]), list(states[-1][nq:])
+                    q, v = stepped(scheme, self.tree, slope, q, v, course.dt)
                     states.append(np.array([*q, *v]))
             return np.array(states)
 

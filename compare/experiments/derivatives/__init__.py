@@ -110,9 +110,8 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
         calls[quantity.name, ways.NUMPY] = partial(quantity.by_numpy, first, dt)
         if ways.COMPILED in measured.shares:
             state = [values[0] for values in quantity.arguments(subject, dt)]
-            calls[quantity.name, ways.COMPILED] = partial(
-                Evaluator(subject.tree, quantity.function).of_one, *state
-            )
+            evaluator = Evaluator(subject.tree, quantity.function)
+            calls[quantity.name, ways.COMPILED] = partial(evaluator.of_one, *state)
     result.times = timing.fastest(calls, setup.of(50, 20, 2))
 
 
@@ -192,9 +191,8 @@ def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: 
 def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
     """MuJoCo's way to a quantity: its own function, centred where it can be."""
     others = [row for row in costs if row.quantity == quantity and row.way not in EXACT]
-    return max(
-        others, key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")), default=None
-    )
+    others.sort(key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")))
+    return others[-1] if others else None
 
 
 def add_advice(
@@ -228,10 +226,8 @@ def add_advice(
         if measured.quantity.name != FORWARD:
             name = measured.quantity.name
             at_scenes = ways.best_of(tried(by_eps, name))
-            rows_here = tried([row for row in measured.rows if row.eps], name)
-            pairs.append(
-                {"row": ways.worst_of_each_eps(rows_here)[at_scenes.eps or 0.0], "scenes": at_scenes}
-            )
+            rows_here = ways.worst_of_each_eps(tried([row for row in measured.rows if row.eps], name))
+            pairs.append({"row": rows_here[at_scenes.eps or 0.0], "scenes": at_scenes})
     result.find("hard", pairs=pairs)
 
 

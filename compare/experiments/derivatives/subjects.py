@@ -50,9 +50,8 @@ def cases_of(robot: Robot) -> list[Case]:
 def along(case: Case, states: int) -> Subject:
     """States at equal times of the motion of a case, its start not among them; fewer where it ends early."""
     scene = case.scene
-    _, q, qd = tmt.simulate(
-        *case.start, case.tau, scene.dt, scene.steps, "dopri8_adaptive", case.tree, tolerance=1e-9
-    )
+    method = "dopri8_adaptive"
+    _, q, qd = tmt.simulate(*case.start, case.tau, scene.dt, scene.steps, method, case.tree, tolerance=1e-9)
     reached = np.flatnonzero(np.isfinite(qd).all(axis=1))
     at = reached[np.linspace(0, len(reached) - 1, states + 1).astype(int)[1:]]
     return Subject(case.name, "scene", case, case.tree, q[at], qd[at], np.tile(case.tau, (len(at), 1)))

@@ -20,7 +20,7 @@ from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
-from ...engines.mujoco.names import has_transition
+from ...engines.mujoco.step import takes_transition
 from ...judge.agree import share_of
 from ...judge.entries import Entries
 from ...judge.rounding import LEFT_OUT, of_positions
@@ -148,7 +148,7 @@ class Quantity(NamedTuple):
             call = partial(of_inverse, dynamics, q, qd, accelerations(subject)[k])
             return [Way(BY_INVERSE, False, call)]
         functions, ways = {BY_STEPS: of_steps} if self.integrator else {}, []
-        if functions and has_transition(dynamics.model, self.integrator):
+        if functions and takes_transition(dynamics.model, self.integrator):
             functions = {TRANSITION: of_transition} | functions
         for side, (name, function) in product((ONE_SIDED, CENTRED), functions.items()):
             state = dynamics, q, qd, subject.tau[k], dt, self.integrator, side == CENTRED
@@ -176,11 +176,8 @@ def step_name(integrator: str) -> str:
 def quantities(subject: Subject, integrators: Sequence[str]) -> list[Quantity]:
     """The derivatives of accelerations and torques, and of a step of each of these integrators of MuJoCo."""
     methods = methods_for(subject.tree)
-    steps = [
-        Quantity(step_name(name), f"step_derivatives:{methods[name].scheme}", STATE, name)
-        for name in integrators
-        if name in methods
-    ]
+    schemes = {name: methods[name].scheme for name in integrators if name in methods}
+    steps = [Quantity(step_name(x), f"step_derivatives:{scheme}", STATE, x) for x, scheme in schemes.items()]
     forward = Quantity(FORWARD, "derivatives", (("rad/s2", "m/s2"),))
     return [forward, Quantity(INVERSE, "inverse_dynamics_derivatives", FORCE), *steps]
 
@@ -203,10 +200,8 @@ def relative(
 
     Sizes up to `least` are zeros. The first is inf where a difference is not a number.
     """
-    size, is_finite = sizes(exact, units), np.isfinite(difference)
-    error = np.zeros(size.shape)
-    np.divide(np.abs(difference), size, out=error, where=is_finite & (size > least))
-    error[~is_finite] = np.inf
+    size = sizes(exact, units)
+    error = share_of(np.abs(difference), np.where(size > least, size, np.inf))
     at = np.unravel_index(int(error.argmax()), error.shape)
     return float(error[at]), f"{units[0][at[0]]} per {units[1][at[1]]}", float(size[at])
 

@@ -240,7 +240,7 @@ def oblique_turn(origin: Origin, reading: Reading, entry: Entry, entries: Sequen
     """The axis of an axisangle is not of length 1."""
     for body in origin.root.iter("body"):
         axis = [float(x) for x in body.get("axisangle", "0 0 1 0").split()[:3]]
-        carriers = map(origin.name, origin.carriers(origin.file.names[entry.joint]))
+        carriers = [origin.name(carrier) for carrier in origin.carriers(origin.file.names[entry.joint])]
         if abs(np.linalg.norm(axis) - 1.0) > CLOSE and body.get("name") in carriers:
             return str(body.get("name"))
     return None

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...core.cause import Cause
-from ...core.text import block
+from ...core.finding import Finding
+from ...core.text import say
 from ...robots.coordinates import point_inertia
 from .numbers import COMPONENTS, Compared
 
@@ -128,6 +129,6 @@ def values_of(number: Compared) -> dict[str, Any]:
 def as_one(kind: str, numbers: Sequence[Compared], **values: Any) -> Cause:
     """A cause in place of those of some numbers; the first of these has its numbers."""
     causes = [cause for each in numbers for cause in each.causes]
-    text = block("parameters", kind, numbers=numbers, **values)
+    text = say(Finding("parameters", kind, {"numbers": numbers, **values}))
     size, rank = max(cause.size for cause in causes), min(cause.rank for cause in causes)
     return replace(causes[0], place=text.partition(":")[0], text=text, size=size, rank=rank)

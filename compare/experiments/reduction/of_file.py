@@ -55,13 +55,14 @@ def add(result: Result, setup: Setup, reading: Reading) -> None:
     candidate = next(candidate for candidate in candidates if candidate.row is row)
     locked = locks.positions(candidate.groups)
     small = finished(candidate.small, scene.motions, row.dt, row.integrator)
+    stay = {actuator.name for actuator in small.spec.actuators}
     facts = {
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
         "scene": {"name": scene.name, "duration": scene.duration},
         "names": list(locked),
-        "actuators": actuators_gone(scene.whole, small),
+        "actuators": [each.name for each in scene.whole.spec.actuators if each.name not in stay],
         "of_actuators": number_of_actuators(scene.whole.model),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
@@ -89,13 +90,9 @@ def add(result: Result, setup: Setup, reading: Reading) -> None:
 
 
 def add_tables(
-    result: Result,
-    scene: Scene,
-    locks: Locks,
-    names: list[str],
-    kinds: list[tuple[FreeRow, Smaller]],
+    result: Result, scene: Scene, locks: Locks, names: list[str], kinds: list[tuple[FreeRow, Smaller]],
     small: Smaller,
-) -> None:
+) -> None:  # fmt: skip
     """Stages of a step, what was used, what was taken out and its time, joints, pairs that came near."""
     use = scene.use
     stages = [stages_of(scene.simulation(file)) for file in (scene.whole, locks.free, small)]
@@ -119,12 +116,6 @@ def add_tables(
     result.tables["reduction_near"] = [PairRow(*pair, distance) for pair, distance in pairs.items()]
 
 
-def actuators_gone(whole: Smaller, small: Smaller) -> list[str]:
-    """Those of locked joints, and those without force."""
-    names = {actuator.name for actuator in small.spec.actuators}
-    return [actuator.name for actuator in whole.spec.actuators if actuator.name not in names]
-
-
 def use_of(scene: Scene) -> list[UseRow]:
     """What the file has and the motion used."""
     use, model = scene.use, scene.whole.model
@@ -142,14 +133,9 @@ def use_of(scene: Scene) -> list[UseRow]:
 
 
 def add_checks(
-    result: Result,
-    scene: Scene,
-    free: Smaller,
-    locked: Mapping[str, np.ndarray],
-    chosen: Answer,
-    small: Smaller,
-    written: Smaller,
-) -> float:
+    result: Result, scene: Scene, free: Smaller, locked: Mapping[str, np.ndarray], chosen: Answer,
+    small: Smaller, written: Smaller,
+) -> float:  # fmt: skip
     """What is taken out changes no bit; the written file is within the error and has tmt's locked equations.
 
     How far the written file, with six digits, is from the model in memory, rad or m.

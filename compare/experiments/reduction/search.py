@@ -59,9 +59,8 @@ def groups_of(scene: Scene, free: Smaller) -> list[Group]:
     through M.
     """
     model, use, places = free.model, scene.use, joints(free.model)
-    most = {
-        name: DOES_SLIDE if kind_of(model, number) == "slide" else DOES for number, name in enumerate(places)
-    }
+    slides = [name for number, name in enumerate(places) if kind_of(model, number) == "slide"]
+    most = dict.fromkeys(places, DOES) | dict.fromkeys(slides, DOES_SLIDE)
     costs = couplings(model, scene.positions(free), np.hstack([use.middle[name] for name in places]))
     groups = []
     for names in tied_joints(model):
@@ -151,15 +150,11 @@ def frontier(
             run, is_own = scene.simulation(small, dt, integrator), (integrator, dt) == own
             paths = run()
             row = FrontierRow(
-                model=name,
-                locked=len(locks.positions(groups)),
-                integrator=integrator,
-                dt=dt,
-                error=scene.apart(paths, reference),
-                error_of_model=error_of_model,
+                model=name, locked=len(locks.positions(groups)), integrator=integrator, dt=dt,
+                error=scene.apart(paths, reference), error_of_model=error_of_model,
                 error_of_step=scene.apart(paths, fine),
                 error_at_own_step=locks.error(groups) if is_own else None,
-            )
+            )  # fmt: skip
             if is_own or row.error <= max(errors):
                 candidates.append(Candidate(row, small, groups))
                 runs.append(run)

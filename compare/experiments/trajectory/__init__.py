@@ -91,17 +91,18 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
     result = TrajectoryResult("trajectory", label=LABELS[robot.compared[0]], shown=SHOWN)
     (drifts,) = work.energy
     result.checks, result.tables["energy"] = drifts.checks, drifts.tables["energy"]
-    beginnings: list[dict[str, Any]] = []
     for part in work.runs:
         result.rows += part.rows
         result.checks += part.checks
         result.runs += part.runs
-        for note in part.notes:
-            beginnings += note.values["runs"]
     errors.find_energy(result, setup.engines["mujoco"])
     errors.find_departures(result, robot)
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
+    beginnings: dict[tuple[str, float], list[str]] = {}
+    for row in result.of_beginnings:
+        if row.level == "open loop":
+            beginnings.setdefault((row.scene, row.dt), []).append(row.engine_integrator)
     if beginnings:
         result.find("beginnings", runs=beginnings)
     result.notes += work.left_out

@@ -123,6 +123,12 @@ class TrajectoryResult(Result):
     # of each scene whose true motion is known: the largest error of both engines, rad or m
     errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
 
+    @property
+    def of_beginnings(self) -> list[TrajectoryRow]:
+        """The rows of runs that have the beginning of a scene alone."""
+        to_end = {(run.case.name, run.dt) for run in self.runs}
+        return [row for row in self.rows if (row.scene, row.dt) not in to_end]
+
     def run_of(self, case: Case, *schemes: str) -> Run | None:
         """The run of a case with its own step by one of these schemes."""
         of_case = [run for run in self.runs if (run.case.name, run.steps) == (case.name, case.steps)]
@@ -166,20 +172,17 @@ def follow(
                 runs = [compare_run(result, twin, dynamics[mujoco], method) for method in methods]
                 if stable is case:
                     result.runs.append(runs[0])
-                else:
-                    about = {"integrators": [method.name for method in methods], "scene": case.name}
-                    result.find("beginnings", runs=[about | {"dt": stable.scene.dt, "end": stable.duration}])
     return result
 
 
 def stable_part(case: Case, scheme: str) -> Case:
     """The case; in a scene of a file whose step the scheme does not bear, its beginning, with a step that it bears.
 
-    The forces of springs limit every scheme, those of damping RK4, and all where servos act.
+    The forces of springs limit every scheme, those of damping RK4, and those of servos Euler, too.
     """
-    decay, frequency = rates_at(case.tree, case.q)
-    is_explicit = METHODS[scheme].stages > 1 or case.tree.has_gains
-    rate = max(decay, frequency) if is_explicit else frequency
+    stepping, (decay, frequency) = METHODS[scheme], rates_at(case.tree, case.q)
+    has_damping = not case.tree.has_gains or getattr(stepping, "implicit_gains", False)
+    rate = frequency if has_damping and stepping.stages == 1 else max(decay, frequency)
     if "user" in case.scene.tags or not case.robot.is_read or rate * case.scene.dt <= BEARABLE:
         return case
     return case.changed(duration=case.steps / rate, dt=1.0 / rate)

@@ -357,6 +357,37 @@ def test_no_answer_is_a_step_that_is_unstable_at_rest():
     assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
 
 
+def many_legs(rng):
+    """A free trunk with 24 legs."""
+    legs = "".join(
+        f"""<body pos="{numbers(rng, 0.1)}"><joint name="leg {leg}" axis="{numbers(rng, 1.0)}"/>
+        <inertial pos="{numbers(rng, 0.05)}" mass="0.5" diaginertia="1e-3 1.2e-3 1.9e-3" quat="{numbers(rng, 1.0, 4)}"/></body>"""
+        for leg in range(24)
+    )
+    trunk = '<freejoint name="base"/><inertial pos="0.01 0 0" mass="5" diaginertia="0.1 0.12 0.2" quat="1 2 3 4"/>'
+    return f"<mujoco><worldbody><body>{trunk}{legs}</body></worldbody></mujoco>"
+
+
+def numbers(rng, size, count=3):
+    return " ".join(map(str, size * rng.normal(size=count)))
+
+
+def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
+    """An error of 1e-11 is still seen."""
+    rng = np.random.default_rng(1)
+    whole = Smaller.whole(Source(many_legs(rng)))
+    legs = {f"leg {leg}": rng.uniform(-2.0, 2.0, 1) for leg in range(24)}
+    small = search.locked(whole, legs)
+    assert small.model.nbody == 2
+    locked = read(whole.model).tree.lock({name: float(q[0]) for name, q in legs.items()})
+    smaller = read(small.model).tree
+    heavier = replace(smaller, mass=tuple((1.0 + 1e-11) * mass for mass in smaller.mass))
+    for other, passed in ((smaller, True), (heavier, False)):
+        result = Result("reduction")
+        of_file.compare_locked(result, "legs locked", locked, other)
+        assert all(check.passed for check in result.checks) is passed
+
+
 def test_a_file_whose_own_run_fails_is_not_judged():
     result = answered(DAMPED.format(0.02, 1.0))
     (check,) = result.checks

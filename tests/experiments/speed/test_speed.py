@@ -8,7 +8,6 @@ from edited import XML, setup_of, setup_of_file, untimed_speed
 from models import PATHS
 
 import tmt
-from compare.engines import Setting
 from compare.engines.heyoka import Heyoka
 from compare.experiments import speed
 from compare.experiments.setup import Setup
@@ -64,20 +63,6 @@ def test_what_takes_too_long_is_left_out(engines):
     assert slow and not taken & set(slow)
     slow = [settings.left_out(engines, size, ARM7.robot) for size in ("quick", "full")]
     assert [("tmt", "implicit_midpoint") in of_size for of_size in slow] == [True, False]
-
-
-def test_every_method_follows_the_scene(engines, of_bent):
-    """Each method with a fine setting is near the reference, and costs evaluations; one that diverges has no error."""
-    for method in settings.methods(engines, "full", BENT):
-        steps = None if method.adaptive else 2**13 if method.order == 1 else 1024
-        setting = Setting(5.0, steps, 1e-5 if method.adaptive else None)
-        row = runs.measured(of_bent, engines[method.engine], method, setting).row
-        tolerance = {1: 0.6, 2: 0.03, None: 1e-3}.get(method.order, 1e-4)
-        assert 0.0 < row.error <= row.worst_error < tolerance and not row.diverged, method
-        assert row.energy_error > 0.0 and row.dt == (5.0 / steps if steps else None)
-    method = engines["tmt"].methods["explicit_euler"]
-    row = runs.measured(of_bent, engines["tmt"], method, Setting(5.0, 64)).row
-    assert row.diverged and row.error is row.worst_error is row.energy_error is None
 
 
 def test_rounding_leaves_eps_times_the_growth(engines):

@@ -29,6 +29,7 @@ EDITS = (
     ("run.command", "carry_out", "not parts.broken", "True", "the exit status is 0 whatever part of the report breaks"),
     ("run.command", "carry_out", "0 if good else 1", "0", "the exit status is 0 whatever fails"),
     ("run.examine", "add_problems", "asked is None or _1", "True", "a problem is told where nobody asks"),
+    ("run.examine", "in_one", "len(replaced) < 2", "True", "no slip is the cause of several numbers"),
     ("run.examine", "progress", "1 + sum(_1)", "sum(_1)", "the first experiment is number 0"),
     ("drawing", "results_needed", "needed[-1:] != [experiment]", "False", "a picture is drawn before its results"),
     ("run.examine", "add_crash", "result.check(*_1)", "None", "an experiment that breaks off is no failed check"),
