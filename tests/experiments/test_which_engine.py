@@ -1,6 +1,7 @@
 """Which engine: servos, batches, times, the reference, the cheapest method, --engines."""
 
 import dataclasses
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,8 +12,9 @@ from compare.core.errors import Refused
 from compare.engines import RECORDS
 from compare.engines.outside import Outside, servos_of
 from compare.engines.outside.bodies import numbers_of
+from compare.engines.outside.file import EngineError, TooLong
 from compare.engines.outside.model import FROM_FILE
-from compare.experiments.engines import rows, servos
+from compare.experiments.engines import integrators, rows, servos
 from compare.experiments.engines.answer import cheapest_engine, cheapest_of
 from compare.experiments.engines.integrators import step_of
 from compare.experiments.engines.motion import free_scene
@@ -110,6 +112,23 @@ def test_the_cheapest_engine_is_that_of_the_least_cost_among_those_that_reach_an
     assert (
         cheapest_engine(rows, "1e_3") == (rows[2], "RK4", 2.0) and cheapest_engine(rows[:1], "1e_3") is None
     )
+
+
+def test_an_engine_that_does_not_answer_in_time_is_asked_nothing_more(setup, monkeypatch):
+    """Another error of a method is said, and the next method tried."""
+    asked, result = [], EnginesResult("engines")
+    monkeypatch.setattr(integrators, "compare_steps", lambda *arguments: None)
+    methods = len(setup.engines["mujoco"].methods)
+    for error, count in ((EngineError("no"), methods), (TooLong("late"), methods + 1)):
+
+        def fail(*arguments, error=error):
+            asked.append(arguments)
+            raise error
+
+        monkeypatch.setattr(integrators, "add_runs", fail)
+        with pytest.raises(TooLong) if isinstance(error, TooLong) else nullcontext():
+            integrators.compare_methods(result, setup, setup.engines["mujoco"])
+        assert len(asked) == count
 
 
 @pytest.mark.parametrize("dt, step", [(0.003, 2.0**-9), (0.002, 2.0**-9), (0.1, 2.0**-7)])

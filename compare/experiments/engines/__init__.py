@@ -112,8 +112,8 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     if free and reading["way"] == FROM_FILE and "armature" not in reading["mended"] and not are_right:
         result.find("armature_of_free", engine=engine.record.label, joints=free)
     if all(reading["mended"].values()):
+        servos.follow_step(result, setup, engine, reads_another)  # soon compiled
         integrators.compare_methods(result, setup, engine)
-        servos.follow_step(result, setup, engine, reads_another)
         batches.time_batches(result, setup, engine)
 
 
