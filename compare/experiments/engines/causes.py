@@ -29,14 +29,9 @@ from .losses import LOSSES, Loss, Text, taken
 MASSES = "mass", "moments", "com", "com_moved", "inertia"
 PLACES = "com", "com_moved", "inertia", "anchor", "anchor_moved", "axis", "axis_moved"
 CLOSE, SINGLE = 1e-6, float(np.finfo(np.float32).eps)
-KEPT = (
-    "compiler",
-    "option",
-    "default",
-    "worldbody",
-    "actuator",
-)  # sections that numbers of bodies and joints follow from
-DRAWN = "material", "mesh", "hfield"  # attributes whose assets are left out
+# sections that numbers of bodies and joints follow from, and attributes whose assets are left out
+KEPT = "compiler", "option", "default", "worldbody", "actuator"
+DRAWN = "material", "mesh", "hfield"
 
 
 class Cause(NamedTuple):
@@ -107,19 +102,19 @@ class Entry(NamedTuple):
     bodies: tuple[str, ...]  # that move with that joint
 
 
-def causes_of(
-    record: EngineRecord, file: File, reading: Reading, entries: Sequence[Entry]
-) -> dict[Entry, Cause]:
-    """The causes of entries, as far as one is known: losses, each with those that were found before, then what else is seen."""
-    origin, causes = origin_of(file), dict[Entry, Cause]()
-    if origin.root.find("worldbody") is not None:
-        explain_by_losses(record, origin, reading, entries, causes)
+Causes = dict[Entry, Cause]
+
+
+def causes_of(record: EngineRecord, file: File, reading: Reading, entries: Sequence[Entry]) -> Causes:
+    """The causes of entries, as far as one is known: losses of the text, then what else is seen."""
+    origin = origin_of(file)
+    causes = explained_by_losses(record, origin, reading, entries)
     finds = [SEEN[kind] for kind in OF_ENGINES.get(record.label, ()) if kind in SEEN]
     for entry in [entry for entry in entries if entry not in causes]:
-        subjects = {find.__name__: find(origin, reading, entry, entries) for find in finds}
-        kind = next((kind for kind, subject in subjects.items() if subject), None)
-        if kind:
-            causes[entry] = Cause(kind, str(subjects[kind]))
+        for find in finds:
+            subject = find(origin, reading, entry, entries)
+            if subject and entry not in causes:
+                causes[entry] = Cause(find.__name__, subject)
     return causes
 
 
@@ -127,29 +122,22 @@ def losses_of(record: EngineRecord) -> list[str]:
     return [kind for kind in OF_ENGINES.get(record.label, ()) if kind in LOSSES]
 
 
-def explain_by_losses(
-    record: EngineRecord,
-    origin: Origin,
-    reading: Reading,
-    entries: Sequence[Entry],
-    causes: dict[Entry, Cause],
-) -> None:
-    lost, is_new, eps = list[Loss](), True, record.eps
-    known = losses_of(record)
-    while is_new and len(causes) < len(entries):
-        is_new = False
-        for kind in known:
-            if LOSSES[kind] in lost:
-                continue
-            changed, source = origin.without([*lost, LOSSES[kind]])
-            numbers = numbers_without(origin, source)
-            fitting = [
-                entry for entry in entries if entry not in causes and fits(reading, numbers, eps, entry)
-            ]
-            if fitting:
-                causes |= dict.fromkeys(fitting, Cause(kind, some_of(changed)))
-                lost.append(LOSSES[kind])
-                is_new = True
+def explained_by_losses(
+    record: EngineRecord, origin: Origin, reading: Reading, entries: Sequence[Entry]
+) -> Causes:
+    """Of each loss, with those that explain others, the entries that it explains; until none explains more."""
+    causes, lost, untried = Causes(), list[Loss](), losses_of(record) if entries else []
+    while untried:
+        kind = untried.pop(0)
+        changed, source = origin.without([*lost, LOSSES[kind]])
+        numbers = numbers_without(origin, source)
+        open_entries = [entry for entry in entries if entry not in causes]
+        fitting = [entry for entry in open_entries if fits(reading, numbers, record.eps, entry)]
+        if fitting:
+            causes |= dict.fromkeys(fitting, Cause(kind, some_of(changed)))
+            lost.append(LOSSES[kind])
+            untried = [kind for kind in losses_of(record) if LOSSES[kind] not in lost]
+    return causes
 
 
 def numbers_without(origin: Origin, source: Source | None) -> Mapping[str, Array]:
@@ -213,21 +201,17 @@ def mass_of_meshes(origin: Origin, reading: Reading, entry: Entry, entries: Sequ
 
 def meshed_bodies(origin: Origin, entry: Entry) -> list[str]:
     """Those of an entry that have meshes and no <inertial> in the file."""
-    stated = (
-        {body.name for body in origin.source.spec.bodies if body.explicitinertial}
-        if origin.source.spec
-        else set()
-    )
+    spec = origin.source.spec
+    stated = {body.name for body in spec.bodies if body.explicitinertial} if spec else set()
     return [name for name in entry.bodies if name in origin.meshed - stated]
 
 
 def turned_start(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
     """Positions of a free body are turned about the place that the file gives it, by the turn that it has there."""
-    model, root = (
-        origin.model,
-        origin.carriers(origin.file.names[entry.joint])[-1] if entry.number in PLACES else 0,
-    )
-    if not root or model.body_dofnum[root] != 6:
+    if entry.number not in PLACES:
+        return None
+    model, root = origin.model, origin.carriers(origin.file.names[entry.joint])[-1]
+    if model.body_dofnum[root] != 6:
         return None
     turn, shift = Rotation.from_quat(np.roll(model.body_quat[root], -1)), model.body_pos[root]
     moved = turn.apply(shift) - shift
