@@ -4,6 +4,7 @@ What a URDF cannot state is set by this program, and is no loss of the engine's.
 """
 
 from abc import abstractmethod
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -62,3 +63,21 @@ class OfUrdf(SteppedModel):
     def armature_matrix(self) -> Array:
         """In the engine's order."""
         return np.diag(self.read["armature"][self.order.v])
+
+
+def without_world(text: str) -> str:
+    """A URDF whose root is the link of its floating joint; Unwritten if other joints stand on the world."""
+    robot = ElementTree.fromstring(text)
+    carried: set[str] = set()
+    for joint in robot.findall("joint"):
+        parent, child = (next(joint.iter(tag)).attrib["link"] for tag in ("parent", "child"))
+        if parent in carried or (joint.get("type") == "floating" and not carried):
+            carried.add(child)
+        elif joint.get("type") != "fixed":
+            raise Unwritten("joints stand on the world beside a free base")
+        if parent not in carried:
+            robot.remove(joint)
+    for link in robot.findall("link"):
+        if link.attrib["name"] not in carried:
+            robot.remove(link)
+    return ElementTree.tostring(robot, encoding="unicode")
