@@ -59,9 +59,9 @@ class Model(OfUrdf):
         for link in (BASE, *numbers):
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
-        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(self.moved)))
+        self.control(pybullet.VELOCITY_CONTROL, np.zeros(len(self.moved)))
 
-    def apply(self, mode: int, forces: Array) -> None:
+    def control(self, mode: int, forces: Array) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
         self.bullet.setJointMotorControlArray(self.robot, self.moved, mode, forces=forces.tolist())
 
@@ -74,7 +74,7 @@ class Model(OfUrdf):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        return super().quantities[: 2 if self.read["armature"].any() else 3]
+        return super().quantities[: 2 if self.used["armature"].any() else 3]
 
     def base(self, x: Array) -> tuple[Array, Rotation]:
         """The position of the centre of mass and the principal axes of a free base."""
@@ -118,7 +118,7 @@ class Model(OfUrdf):
 
     def set_force(self, force: Array) -> None:
         free = 6 * self.free
-        self.apply(self.bullet.TORQUE_CONTROL, force[free:])
+        self.control(self.bullet.TORQUE_CONTROL, force[free:])
         if free:
             place, _ = self.bullet.getBasePositionAndOrientation(self.robot)
             in_world = self.bullet.WORLD_FRAME
