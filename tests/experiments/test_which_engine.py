@@ -95,7 +95,14 @@ def test_the_cheapest_method_is_that_of_the_engines_own_time():
 
 
 @pytest.mark.parametrize(
-    "errors, is_floor", (((1e-3, 5e-4), False), ((1e-3, 6e-4), True), ((1e-6, 2e-6), True), ((1e-6,), False))
+    "errors, is_floor",
+    (
+        ((1e-3, 5e-4), False),
+        ((1e-3, 6e-4), True),
+        ((1e-5, 2e-5, 1e-6), True),
+        ((1.0, 1.0, 1e-3), False),
+        ((1e-6,), False),
+    ),
 )
 def test_a_floor_is_where_errors_fall_no_further(errors, is_floor):
     """Else the smallest error is that of the last run; whether a finer one was left out is said of it."""
