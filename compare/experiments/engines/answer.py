@@ -1,6 +1,7 @@
 """Which engine: two verdicts of each, and the cheapest of its methods for three errors."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from ...engines import LABELS
@@ -71,7 +72,7 @@ def cheapest_of(runs: Sequence[MethodRow], duration: float) -> Mapping[str, Any]
     least = min(ended, key=lambda row: row.worst_error or 0.0, default=None)
     fields |= {"floor": least and least.worst_error, "floor_method": least and least.method}
     errors = [row.worst_error or 0.0 for row in ended if least and row.method == least.method]
-    pairs = [pair for pair in zip(errors, errors[1:]) if pair[0] < REGULAR]
+    pairs = [pair for pair in pairwise(errors) if pair[0] < REGULAR]
     is_reached = any(after * FALLS > before for before, after in pairs)
     is_left_out = any(row.finer_left_out for row in runs) and not is_reached
     return fields | {"floor_reached": is_reached, "finer_left_out": is_left_out}
