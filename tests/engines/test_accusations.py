@@ -3,14 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
-from files import STL
+from files import STL, URDF
 
 import tmt
 from compare.engines import RECORDS
 from compare.engines.outside import Outside
-from compare.engines.outside.file import OtherJoints, Unread, Unwritten
+from compare.engines.outside.file import File, OtherJoints, Unread, Unwritten
 from compare.experiments.engines import add_not_asked, names_of_free
-from compare.experiments.engines.causes import OF_ENGINES
+from compare.experiments.engines.causes import OF_ENGINES, joints_lost
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult
 from compare.run.reference import compared_with
@@ -222,6 +222,11 @@ def test_a_cause_is_confirmed_by_the_engine_itself(kind, engine, text, ask, stat
     path = file_of(tmp_path, text)
     assert np.abs(np.subtract(ask(path), stated(path))).max() > 1e-10, "the engine reads it as MuJoCo does"
     assert kinds_named(engine, path) == {kind}
+
+
+def test_a_urdf_has_none_of_these_causes(tmp_path):
+    path = file_of(tmp_path, URDF).rename(tmp_path / "robot.urdf")
+    assert joints_lost(RECORDS["pinocchio"], File(path, ("j",), ("hinge",)), 0) is None
 
 
 def test_each_cause_that_an_engine_can_have_has_a_script():

@@ -52,7 +52,7 @@ class Origin:
         self.places = joint_places(self.model)
         self.meshed = {name for name, are_meshes in self.source.mesh_geoms if any(are_meshes)}  # of bodies
         self.root = ElementTree.Element("mujoco")
-        with suppress(Unread):
+        with suppress(Unread, OSError):  # a file that is not all in its text
             if file.path.suffix != ".urdf":
                 self.root = ElementTree.fromstring(whole_text(file.path))
         for section in [part for part in self.root if part.tag not in KEPT]:
@@ -118,15 +118,17 @@ def causes_of(record: EngineRecord, file: File, reading: Reading, entries: Seque
     return causes
 
 
-def losses_of(record: EngineRecord) -> list[str]:
-    return [kind for kind in OF_ENGINES.get(record.label, ()) if kind in LOSSES]
+def losses_of(record: EngineRecord, origin: Origin) -> list[str]:
+    """The kinds of what an engine leaves out of a text; none of a URDF."""
+    kinds = OF_ENGINES.get(record.label, ()) if origin.root.find("worldbody") is not None else ()
+    return [kind for kind in kinds if kind in LOSSES]
 
 
 def explained_by_losses(
     record: EngineRecord, origin: Origin, reading: Reading, entries: Sequence[Entry]
 ) -> Causes:
     """Of each loss, with those that explain others, the entries that it explains; until none explains more."""
-    causes, lost, untried = Causes(), list[Loss](), losses_of(record) if entries else []
+    causes, lost, untried = Causes(), list[Loss](), losses_of(record, origin) if entries else []
     while untried:
         kind = untried.pop(0)
         changed, source = origin.without([*lost, LOSSES[kind]])
@@ -136,7 +138,7 @@ def explained_by_losses(
         if fitting:
             causes |= dict.fromkeys(fitting, Cause(kind, some_of(changed)))
             lost.append(LOSSES[kind])
-            untried = [kind for kind in losses_of(record) if LOSSES[kind] not in lost]
+            untried = [kind for kind in losses_of(record, origin) if LOSSES[kind] not in lost]
     return causes
 
 
@@ -169,7 +171,7 @@ def fits(reading: Reading, numbers: Mapping[str, Array], eps: float, entry: Entr
 def joints_lost(record: EngineRecord, file: File, speeds: int) -> Cause | None:
     """Why an engine has this number of speeds, or None."""
     origin = origin_of(file)
-    for kind in losses_of(record):
+    for kind in losses_of(record, origin):
         changed, source = origin.without([LOSSES[kind]])
         if changed and (source.model.nv if source else 0) == speeds:
             return Cause(kind, some_of(changed))

@@ -121,15 +121,14 @@ def armature_without_motor(text: Text) -> list[str]:
 
 
 def geoms_without_contacts(text: Text) -> list[str]:
-    bodies = []
-    for body in text.root.iter("body"):
-        for geom in body.findall("geom"):
-            of_class = next(name for part, name in text.parts("geom") if part is geom)
-            bits = [text.stated(geom, of_class, attribute)[0] for attribute in ("contype", "conaffinity")]
-            if bits == ["0", "0"]:
-                geom.set("mass", "0")
-                bodies.append(body.get("name", ""))
-    return bodies
+    bodies = {geom: body for body in text.root.iter("body") for geom in body.findall("geom")}
+    apart = []
+    for geom, of_class in text.parts("geom"):
+        bits = {text.stated(geom, of_class, attribute)[0] for attribute in ("contype", "conaffinity")}
+        if bits == {"0"} and geom in bodies:
+            geom.set("mass", "0")
+            apart.append(bodies[geom].get("name", ""))
+    return apart
 
 
 def left_out(text: Text, tag: str) -> list[str]:
