@@ -224,7 +224,7 @@ def turned_start(origin: Origin, reading: Reading, entry: Entry, entries: Sequen
 
 def oblique_turn(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
     """The axis of an axisangle is not of length 1."""
-    for body in origin.root.iter("body"):
+    for body in origin.root.iter("body") if entry.number in (*PLACES, "moments") else ():
         axis = [float(x) for x in body.get("axisangle", "0 0 1 0").split()[:3]]
         carriers = [origin.name(carrier) for carrier in origin.carriers(origin.file.names[entry.joint])]
         if abs(np.linalg.norm(axis) - 1.0) > CLOSE and body.get("name") in carriers:
