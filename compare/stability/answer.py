@@ -201,7 +201,7 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
     if row.limit == "moving":
         shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep=0.0)
-        row.creep = shown.speed_after(runs.LIMIT_PUSHES[0], shown.fine, runs.lasting(shown.fine))
+        row.creep = shown.fine_speed(runs.LIMIT_PUSHES[0])
         row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
     row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)
     if row.limit != "moving" and row.file_dt <= row.longest:

@@ -84,9 +84,9 @@ class Runs:
     def shown(self) -> Callable[..., Shown]:
         return lru_cache(self.run)
 
-    def speed_after(self, push: float, dt: float, lasts: float) -> float:
-        """The speed at the end of a run after a push one way; inf: it fails, or ends elsewhere."""
-        return self.shown(push, dt, lasts, 0).speed
+    def fine_speed(self, push: float, times: int = 1, way: int = 0) -> float:
+        """The speed at the end of a run of fine steps, or of a multiple; inf: it fails, or ends elsewhere."""
+        return self.shown(max(push, LIMIT_PUSHES[0]), times * self.fine, lasting(self.fine), way).speed
 
     def run(self, push: float, dt: float, lasts: float, way: int) -> Shown:
         """A run after a push of all speeds. Elsewhere is also where a robot lies still that has fallen over."""
@@ -116,12 +116,15 @@ class Runs:
 
     def is_calm(self, push: float, dt: float, way: int = 0) -> bool:
         """Whether the robot calms down after a push; where that is open, in a longer run."""
-        allowed = max(CALM, CALMER * push, AS_FAST * self.creep)
         lasts = lasting(dt)
+        longer = min(LONGER * lasts, max(lasts, MOST_STEPS * dt))
+        is_open = self.shown(push, dt, lasts, way).speed <= USUAL_PUSH
+        return self.calms(push, dt, lasts, way) or (is_open and self.calms(push, dt, longer, way))
+
+    def calms(self, push: float, dt: float, lasts: float, way: int) -> bool:
+        """Whether a run after a push calms down."""
         shown = self.shown(push, dt, lasts, way)
-        if allowed < shown.speed <= USUAL_PUSH and not shown.decays:
-            shown = self.shown(push, dt, min(LONGER * lasts, max(lasts, MOST_STEPS * dt)), way)
-        return shown.speed <= allowed or shown.decays
+        return shown.speed <= max(CALM, CALMER * push, AS_FAST * self.creep) or shown.decays
 
     def survives(self, push: float, dt: float, way: int = 0) -> bool:
         """Whether the robot calms down after a push, or moves on no faster than runs of fine steps let expect.
@@ -129,10 +132,9 @@ class Runs:
         So does what nothing brakes. That is not asked after a push larger than usual.
         """
         speed = self.shown(push, dt, lasting(dt), way).speed
-        is_slow = push <= USUAL_PUSH and np.isfinite(speed) and speed > max(CALM, CALMER * push)
-        if is_slow and speed <= AS_FAST * self.expected(push, dt):
-            return True
-        return self.is_calm(push, dt, way)
+        if push > USUAL_PUSH or not np.isfinite(speed) or self.calms(push, dt, lasting(dt), way):
+            return self.is_calm(push, dt, way)
+        return speed <= AS_FAST * self.expected(push, dt) or self.is_calm(push, dt, way)
 
     def expected(self, push: float, dt: float) -> float:
         """The speed at the end of a run by what it is at fine steps, rad/s or m/s.
@@ -140,7 +142,7 @@ class Runs:
         Contacts that open and close chatter the faster the coarser the step: by the power of it that fine steps show, at most
         the first. What slides creeps as fast as contacts are soft, and MuJoCo softens them to twice the step (refsafe).
         """
-        fine, twice = (self.speed_after(push, k * self.fine, lasting(dt)) for k in (1, 2))
+        fine, twice = (self.fine_speed(push, times) for times in (1, 2))
         power = np.clip(np.log2(twice / fine), 0.0, 1.0) if 0.0 < fine < twice < np.inf else 0.0
         return fine * float((dt / self.fine) ** power) * max(1.0, 2.0 * dt / self.timeconst)
 
@@ -151,16 +153,17 @@ class Runs:
         times = model.geom_solref[(model.geom_contype | model.geom_conaffinity) != 0, 0]
         return float(times[times > 0.0].min(initial=np.inf)) if on(model, "REFSAFE") else np.inf
 
-    def hold(self, dt: float, way: int = 0) -> bool:
-        """Whether the robot stays at rest after small pushes, or leaves it in runs of fine steps, too, as a drone does."""
-        return all(
-            self.survives(push, dt, way) or self.speed_after(push, self.fine, lasting(dt)) == np.inf
-            for push in LIMIT_PUSHES
-        )
+    def holds(self, push: float, dt: float, way: int = 0) -> bool:
+        """Whether the robot stays at rest after a small push, or leaves it in runs of fine steps, too, as a drone does."""
+        return self.survives(push, dt, way) or self.fine_speed(push) == np.inf
+
+    def hold(self, dt: float) -> bool:
+        """Whether the robot stays at rest after one small push."""
+        return self.holds(LIMIT_PUSHES[0], dt)
 
     def all_hold(self, dt: float) -> bool:
-        """Whether the robot stays at rest whichever way it is pushed."""
-        return all(self.hold(dt, way) for way in WAYS)
+        """Whether the robot stays at rest whichever way it is pushed, and how little."""
+        return all(self.holds(push, dt, way) for way in WAYS for push in LIMIT_PUSHES)
 
     def limit(self, dt: float, predicted: float) -> tuple[float | None, float | None]:
         """The longest step at which runs hold and the shortest at which they fail, s.
@@ -182,12 +185,12 @@ class Runs:
         return bisected(self.all_hold, low, high, WITHIN) if high else (low, None)
 
     def largest_push(self, dt: float) -> tuple[float, bool | None]:
-        """The largest push that is survived at a step, rad/s or m/s, 0.0: none; and whether fine steps bear no larger one.
+        """The largest push that is survived whichever way, rad/s or m/s, 0.0: none; whether fine steps bear no larger one.
 
         What fine steps bear is not asked beyond a usual push.
         """
-        survived = next((push for push in PUSHES if self.survives(push, dt)), 0.0)
+        survived = next((push for push in PUSHES if all(self.survives(push, dt, way) for way in WAYS)), 0.0)
         if survived >= USUAL_PUSH:
             return survived, None
         larger = min(push for push in PUSHES if push > survived)
-        return survived, self.speed_after(larger, self.fine, lasting(dt)) > THROWN * larger
+        return survived, any(self.fine_speed(larger, way=way) > THROWN * larger for way in WAYS)

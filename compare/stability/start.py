@@ -65,10 +65,10 @@ class StartRuns:
             return whole_run(self.place.reading.model, self.start, dt, self.integrator, lasts, PARTS)
 
     def until_rest(self, dt: float) -> tuple[WholeRun, float]:
-        """A run at a step, and how long it lasts, s: longer, where it has not come to rest."""
+        """A run at a step, and how long it lasts, s: longer, where it has not come to rest, if that takes few steps."""
         lasts = float(np.clip(LASTS, LEAST_STEPS * dt, MOST_STEPS * dt))
         run = self.run(dt, lasts)
-        if not (is_calm(run) or run.failed_at):
+        if not (is_calm(run) or run.failed_at) and LONGER * lasts <= MOST_STEPS * dt:
             lasts *= LONGER
             run = self.run(dt, lasts)
         return run, lasts

@@ -128,7 +128,7 @@ def test_a_slow_decay_is_a_rest_and_what_never_ends_is_none():
         weak = runs_of(hinge(20.0, kv, integrator="implicitfast"), "implicitfast")
         start = Step(weak.model, 1e-3, "Euler").moved(weak.state, np.array([2e-3, 0.0]))
         swinging = replace(weak, state=start)
-        assert swinging.speed_after(1e-3, 2e-3, 4.0) > 4e-3 and swinging.is_calm(1e-3, 2e-3) is calm
+        assert swinging.shown(1e-3, 2e-3, 4.0, 0).speed > 4e-3 and swinging.is_calm(1e-3, 2e-3) is calm
 
 
 def test_what_chatters_at_fine_steps_may_do_so_faster_at_coarse_ones():
@@ -136,7 +136,7 @@ def test_what_chatters_at_fine_steps_may_do_so_faster_at_coarse_ones():
     brake = '<general joint="turn" biastype="affine" biasprm="0 0 -1000" forcerange="-0.05 0.05"/>'
     shown = runs_of(hinge(joint='stiffness="20"', actuator=brake))
     for dt in (2e-3, 8e-3, 3e-2):
-        assert dt / 2.0 < shown.speed_after(1e-3, dt, lasting(dt)) < 1.1 * dt
+        assert dt / 2.0 < shown.shown(1e-3, dt, lasting(dt), 0).speed < 1.1 * dt
         assert shown.survives(1e-3, dt) and not replace(shown, fine=5e-5).survives(1e-3, dt)
 
 
@@ -144,7 +144,7 @@ def test_a_creep_grows_as_contacts_are_softened_to_twice_the_step():
     """The speed of a sticking contact is proportional to its time constant."""
     text = sphere(0.02, impratio=1.0, pull=3.0, condim=3, x="").replace('refsafe="disable"', "")
     shown = runs_of(text)
-    fine, coarse = (shown.speed_after(1e-3, dt, 4.0) for dt in (2e-3, 0.05))
+    fine, coarse = (shown.shown(1e-3, dt, 4.0, 0).speed for dt in (2e-3, 0.05))
     assert coarse == pytest.approx(5.0 * fine, rel=0.01) and fine > 2e-3
     assert shown.expected(1e-3, 0.05) == pytest.approx(coarse, rel=0.01) and shown.survives(1e-3, 0.05)
     assert runs_of(sphere()).timeconst == np.inf
@@ -184,7 +184,7 @@ def test_a_body_that_leaves_at_fine_steps_too_has_no_limit_of_the_step():
       <actuator><motor site="up" gear="0 0 1 0 0 0"/></actuator><keyframe><key qpos="0 0 9 1 0 0 0" ctrl="9.81"/></keyframe>
       </mujoco>"""
     shown = runs_of(hover)
-    assert shown.speed_after(1e-3, 0.01, 4.0) > 0.05
+    assert shown.shown(1e-3, 0.01, 4.0, 0).speed > 0.05
     assert shown.limit(0.01, np.inf) == (0.2, None)
 
 
