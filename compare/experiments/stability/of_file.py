@@ -24,7 +24,7 @@ OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
 WHOLE = 1e-9  # of a step: a delay that is so near to whole steps is
 MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
-DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
+DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
 FAR, CREEPS = 0.05, 1e-4  # rad or m, rad/s or m/s: of a rest that is told, from its posture, and of a creep
 MODES = "growth of a step in closed form, TMT to MuJoCo"
 PUSHED = "stable after a push"
@@ -112,7 +112,13 @@ def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
 
 
 def add(result: StabilityResult, work: Work) -> None:
-    """Rows, checks, the answer at the top, the curves, and what makes the step stable."""
+    """Rows, checks, the answer at the top, the curves, and what makes the step stable; motions first, if they are asked for."""
+    for moving in work.motions:
+        result.tables.setdefault("motion_stability", []).append(moving)
+        passed = 1 if moving.passed else None
+        where, quantity = moving.posture, "growth along its motion"
+        result.check(where, quantity, passed, 1, "runs", rule="equal", about=About.STEP)
+        result.top.append(result.finding("motion", OF, row=moving))
     for step in work.steps:
         runs = own_run.add(result, list(step.runs), step.is_requested)
         places = list(step.answers)
@@ -126,12 +132,6 @@ def add(result: StabilityResult, work: Work) -> None:
         result.top.append(result.finding("left_out", OF, most=MOST_POSTURES, names=work.left_out))
     for row in work.control:
         add_control(result, row)
-    for moving in work.motions:
-        result.tables.setdefault("motion_stability", []).append(moving)
-        passed = 1 if moving.passed else None
-        where, quantity = moving.posture, "growth along its motion"
-        result.check(where, quantity, passed, 1, "runs", rule="equal", about=About.STEP)
-        result.top.append(result.finding("motion", OF, row=moving))
 
 
 def in_use(rows: Sequence[StepLimitRow], integrator: str) -> list[StepLimitRow]:
@@ -195,15 +195,13 @@ def add_answer(
         requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=CALM,
     )  # fmt: skip
     if is_calm:
-        tell("own_run", run=runs[0], others=len(runs) - 1)
-    if step.is_requested:
-        add_facts(tell, worst, None)
-    else:
+        creeps = any((row.creep or 0.0) > CREEPS for row in as_it_stands)
+        tell("own_run", run=runs[0], others=len(runs) - 1, creeps=creeps)
+    add_facts(tell, worst)
+    if not step.is_requested:
         known = [place for place in places if place.rows]
         for place in known if len(rows) > 1 else ():
             tell("limits_at", rows=place.rows, up_to=LONGEST)
-        is_default = (asked.dt, asked.integrator) == (DEFAULT_STEP, DEFAULT)
-        add_facts(tell, worst, None if is_default else next(iter(as_it_stands), None))
         for first in (place.rows[0] for place in known):
             if first.surroundings != "air" and is_told(first):
                 tell("rest", row=first, far=FAR, creeps=CREEPS)
@@ -223,8 +221,8 @@ def others_at(row: StepLimitRow, rows: Iterable[StepLimitRow]) -> list[StepLimit
     return list({other.integrator: other for other in here}.values())
 
 
-def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: StepLimitRow | None) -> None:
-    """What else matters of the step in use, and of MuJoCo's default step. default: that of Euler, where it is another."""
+def add_facts(tell: Callable[..., None], row: StepLimitRow | None) -> None:
+    """What else matters of the step in use."""
     if row is None:
         return
     if row.decided_by_runs and row.limit in ("finite", "none"):
@@ -233,10 +231,6 @@ def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: Step
         tell("push", row=row)
     if row.needs_friction(row.file_dt):
         tell("friction", row=row)
-    if default and default.integrator == DEFAULT and default.is_known:
-        held = default.needs_friction(DEFAULT_STEP)
-        if held or default.longest < DEFAULT_STEP:
-            tell("default", dt=DEFAULT_STEP, integrator=DEFAULT, held=held)
 
 
 def is_told(row: StepLimitRow) -> bool:
@@ -260,8 +254,10 @@ def add_control(result: StabilityResult, row: ControlRow | None) -> None:
 
 
 def headline(result: StabilityResult) -> Finding | None:
-    """Whether the file's step is stable."""
+    """Whether the file's step is stable: along the worst of the motions that are asked for, else at rest."""
     table = result.tables["step_limits"]
     own = in_use(table, table[0].file_integrator)
-    values = {"up_to": LONGEST, "dt": table[0].file_dt}
-    return result.finding("headline", OF, row=own[0], **values) if own else None
+    motions: list[MotionRow] = result.tables.get("motion_stability", [])
+    motion = max(motions, key=lambda row: (not row.passed, row.rate), default=None)
+    values = {"row": own[0] if own else None, "up_to": LONGEST, "dt": table[0].file_dt, "motion": motion}
+    return result.finding("headline", OF, **values) if own or motion else None
