@@ -5,8 +5,8 @@ import pytest
 
 from compare.engines.mujoco.reading import read
 from compare.experiments.stability import own_run
-from compare.stability.answer import Asked, answer
-from compare.stability.place import Posture, standing_at
+from compare.stability.answer import Asked, answers
+from compare.stability.place import Posture
 from compare.stability.rest import RELAXED_STEPS
 from compare.stability.start import StartRuns
 
@@ -19,7 +19,7 @@ GO = 0.01  # s
 
 
 def starts(q, dt=GO):
-    return StartRuns(standing_at(read(TIPPING.format(dt=dt, q=q)), LEAN), "Euler")
+    return StartRuns(read(TIPPING.format(dt=dt, q=q)), LEAN, "Euler")
 
 
 @pytest.mark.parametrize("q, outcome", [(0.55, "calm"), (0.8, "alike"), (1.2, "worse")])
@@ -43,7 +43,8 @@ def test_the_longest_step_from_the_posture_itself_is_where_its_runs_change():
 
 def test_a_row_has_the_step_from_the_posture_beside_its_limit_where_it_is_lower():
     for q, lower in ((1.2, True), (0.52, False)):
-        (row,) = answer(LEAN, True, read(TIPPING.format(dt=1e-3, q=q)), Asked(1e-3, "Euler", ["Euler"])).rows
+        first = answers(LEAN, read(TIPPING.format(dt=1e-3, q=q)), Asked(1e-3, "Euler", ["Euler"]))[0]
+        (row,) = first.rows
         assert row.stable_at_file_dt and (row.start_dt is not None) is lower
         assert not lower or row.start_dt < 0.97 * row.longest
 
@@ -51,6 +52,6 @@ def test_a_row_has_the_step_from_the_posture_beside_its_limit_where_it_is_lower(
 def test_what_is_held_is_asked_at_the_fine_step_of_the_relaxed_run():
     """At a coarse step MuJoCo softens the stop (refsafe), and the rest lies deeper in it."""
     text = TIPPING.format(dt=0.03, q=0.52).replace('<flag refsafe="disable"/>', "")
-    runs = StartRuns(standing_at(read(text), LEAN), "Euler")
+    runs = StartRuns(read(text), LEAN, "Euler")
     assert runs.place.left > 0.02 and RELAXED_STEPS[0] < 0.03
     assert np.array_equal(runs.is_held, [True])

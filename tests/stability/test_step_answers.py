@@ -7,7 +7,7 @@ from small import HOLDING, INERTIA, KINDS, LEG, STANDING, hinge, two
 
 import compare
 from compare.engines.mujoco.reading import read
-from compare.stability.answer import Asked, StepLimitRow, answer
+from compare.stability.answer import Asked, StepLimitRow, answers
 from compare.stability.place import posture_of, postures_of
 
 KEYS = '<keyframe><key name="low" qpos="0.3 -0.2"/><key qpos="0 0"/></keyframe>'
@@ -102,7 +102,7 @@ def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
 def test_a_curve_has_the_growth_of_the_step_of_one_hinge():
     reading = read(hinge(20.0, 5.0))
     asked = Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)
-    found = answer(postures_of(reading)[0], True, reading, asked)
+    (found,) = answers(postures_of(reading)[0], reading, asked)
     curve, limit = found.curves["Euler"], found.rows[0].predicted_dt
     assert all((factor > 1.0) == (dt > limit) for dt, factor in curve)
     dt, factor = curve[-1]
@@ -110,7 +110,7 @@ def test_a_curve_has_the_growth_of_the_step_of_one_hinge():
     exact = np.abs(np.linalg.eigvals(np.array([[1.0, dt], [0.0, 1.0]]) @ speeds)).max()
     assert factor == pytest.approx(exact, rel=1e-6) and exact > 1.05
     assert found.cures == []
-    unstable = answer(postures_of(reading)[0], True, reading, Asked(0.03, "Euler", ["Euler"], in_runs=False))
+    (unstable,) = answers(postures_of(reading)[0], reading, Asked(0.03, "Euler", ["Euler"], in_runs=False))
     assert {cure.change for cure in unstable.cures} >= {"less_kv", "more_armature"}
     assert unstable.rows[0].stable_at_file_dt is False
 

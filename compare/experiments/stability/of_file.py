@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from itertools import chain
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -9,7 +10,7 @@ from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.finding import Finding
 from ...engines.mujoco.reading import Reading
 from ...robots.file import names_of_keys
-from ...stability.answer import Asked, PlaceAnswer, StepLimitRow, answer, integrators_at_rest
+from ...stability.answer import Asked, PlaceAnswer, StepLimitRow, answers, integrators_at_rest
 from ...stability.control import MOST_PERIOD, controlled
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import MotionRow, motion
@@ -37,7 +38,7 @@ class AtStep(NamedTuple):
     asked: Asked
     is_requested: bool
     runs: Iterable[OwnRunRow]
-    answers: Iterable[PlaceAnswer]
+    answers: Iterable[list[PlaceAnswer]]
 
 
 class Work(NamedTuple):
@@ -64,13 +65,12 @@ def begin(setup: Setup, reading: Reading) -> Work:
         is_requested = question is not asked[0]
         others = question._replace(integrators=[question.integrator], drawn=False, in_runs=setup.alone)
         tasks = [
-            (posture, contacts, others if number else question)
+            (posture, others if number else question)
             for number, posture in enumerate(postures if setup.alone else postures[:1])
-            for contacts in ((True,) if is_requested else (True, False))
         ]
         runs = own_run.begin(setup, reading, question.dt, question.integrator)
-        answers = setup.map(partial(answer_of, reading=reading), tasks)
-        steps.append(AtStep(question, is_requested, runs, answers))
+        found = setup.map(partial(answers_of, reading=reading, air=not is_requested), tasks)
+        steps.append(AtStep(question, is_requested, runs, found))
     control = partial(control_row, reading=reading, request=request, asked=asked[-1])
     moving = partial(motion_row, reading=reading, asked=asked[-1])
     return Work(
@@ -81,9 +81,9 @@ def begin(setup: Setup, reading: Reading) -> Work:
     )
 
 
-def answer_of(task: tuple[Posture, bool, Asked], reading: Reading) -> PlaceAnswer:
-    posture, contacts, asked = task
-    return answer(posture, contacts, reading, asked)
+def answers_of(task: tuple[Posture, Asked], reading: Reading, air: bool) -> list[PlaceAnswer]:
+    posture, asked = task
+    return answers(posture, reading, asked, air)
 
 
 def control_row(posture: Posture, reading: Reading, request: Request, asked: Asked) -> ControlRow | None:
@@ -121,7 +121,7 @@ def add(result: StabilityResult, work: Work) -> None:
         result.top.append(result.finding("motion", OF, row=moving))
     for step in work.steps:
         runs = own_run.add(result, list(step.runs), step.is_requested)
-        places = list(step.answers)
+        places = list(chain.from_iterable(step.answers))
         rows = [row for place in places for row in place.rows]
         add_checks(result, rows, AT_REQUESTED_STEP if step.is_requested else AT_OWN_STEP)
         add_answer(result, places, step, runs)
@@ -199,10 +199,9 @@ def add_answer(
         tell("own_run", run=runs[0], others=len(runs) - 1, creeps=creeps)
     add_facts(tell, worst)
     if not step.is_requested:
-        known = [place for place in places if place.rows]
-        for place in known if len(rows) > 1 else ():
+        for place in places if len(rows) > 1 else ():
             tell("limits_at", rows=place.rows, up_to=LONGEST)
-        for first in (place.rows[0] for place in known):
+        for first in (place.rows[0] for place in places):
             if first.surroundings != "air" and is_told(first):
                 tell("rest", row=first, far=FAR, creeps=CREEPS)
     if worst and worst.stable_at_file_dt is False:

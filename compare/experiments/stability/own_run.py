@@ -9,7 +9,7 @@ from ...engines.mujoco.names import on
 from ...engines.mujoco.step import WholeRun
 from ...judge.run import number_or_none
 from ...robots.file import names_of_keys
-from ...stability.place import MOST_POSTURES, Posture, standing_at
+from ...stability.place import MOST_POSTURES, Posture
 from ...stability.start import CALM, StartRuns, is_calm
 from ..setup import Setup
 from .tables import OwnRunRow
@@ -33,7 +33,7 @@ def own_run(key: str, dt: float, integrator: str, reading: Reading) -> OwnRunRow
     finer step it does not; alike, it does so there too; fails, it diverges there too.
     """
     name = names_of_keys(reading).get(key, "qpos0")
-    starts = StartRuns(standing_at(reading, Posture(name, key)), integrator)
+    starts = StartRuns(reading, Posture(name, key), integrator)
     outcome, finer = "calm", None
     own, lasts = starts.until_rest(dt)
     finer_dt = dt / min(FINER, max(2, MOST_FINER // round(lasts / dt)))

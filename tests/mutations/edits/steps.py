@@ -42,7 +42,7 @@ EDITS = (
     ("naming", "limiting", "taken > most", "taken < most", "the contact that takes least limits"),
     ("stability.answer", "StepLimitRow.longest", "self.decided_by_runs", "False", "the file's own run says nothing"),
     ("stability.answer", "add_smooth_limit", "limit(place.frictionless, *_1)", "limit(place.model, *_1)", "dry friction stays"),
-    ("stability.answer", "answer", "place and not contacts", "False", "in the air it stands"),
+    ("stability.answer", "answers", "[*found, _1]", "found", "nothing is told of the air"),
     ("stability.place", "placed", "np.array(posture.q) if _1 else None", "None", "a posture in numbers is qpos0"),
     ("stability.place", "placed", "thrown or touches(*_1)", "thrown", "what bounces on its floor is in the air"),
     ("stability.place", "placed", "restless_objects(*_1) if contacts else _2", "_2", "what moves on beside it hides a robot"),
