@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from filelock import FileLock
 from hypothesis import settings
-from in_process import without_workers
-from small_runs import of_arm
+from in_process import of_arm, without_workers
 
 from compare.engines.mujoco import parse
 from compare.robots.arm import ARM

@@ -1,7 +1,7 @@
 """A second robot, of four hinges: nothing in compare knows it.
 
 Its hinges branch, and stand in another order in the file; one body is fixed to the world, and two are on one hinge.
-For test_second_robot, small_runs and the tests that import it.
+For the tests that import it.
 """
 
 from pathlib import Path

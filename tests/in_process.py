@@ -1,13 +1,18 @@
-"""For tests of whole runs: the command line without its further processes, which take 2.5 s to start."""
+"""For tests of whole runs: the command line without its further processes, which take 2.5 s to start; small runs of the arm."""
 
 from concurrent.futures import Future
 from contextlib import contextmanager
+from functools import cache
 
 import pytest
 
 from compare.__main__ import main
+from compare.engines.mujoco import parse
+from compare.experiments import module
 from compare.process.workers import Clock
+from compare.robots.arm import ARM
 from compare.run import command
+from compare.run.examine import Setup, engines
 
 
 class InProcess:
@@ -45,3 +50,16 @@ def answered(arguments, capsys) -> tuple[int, str, str]:
     except SystemExit as stop:
         status = stop.code
     return status, *capsys.readouterr()
+
+
+@cache
+def of_arm(name):
+    """The result of an experiment on the arm, every path with few states and steps."""
+    return module(name).rows(Setup.small(ARM, engines(parse(ARM.mjcf, ARM.tree))))
+
+
+class Lines(list):
+    """A terminal that keeps what is said."""
+
+    def say(self, text="", style=""):
+        self.append(text)

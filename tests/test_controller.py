@@ -8,11 +8,8 @@ from models import PATHS
 
 from compare.engines.mujoco import read
 from compare.robots.actuators import Actuator, Drive, controller, reason
-from compare.robots.case import rates_at
 from compare.robots.file import robot_of
-from compare.robots.scene import WrongField
 
-PLAIN = Actuator("s", "a", (1.0,))
 SERVO = Actuator("servo", "b", (0.0, 2.0), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, -4.0))
 TENDON = Actuator("tendon", "a", (0.5, -0.7), gain=(30.0, 0.0, 0.0), bias=(1.0, -20.0, 0.0))
 MOTOR = Actuator("motor", "a", (3.0, 0.0), gain=(2.0, 0.0, 0.0))
@@ -22,12 +19,6 @@ Q = np.array([0.3, -0.4])
 @pytest.fixture(scope="module")
 def gripper():
     return robot_of(read(PATHS["gripper"]), "gripper.xml")
-
-
-def test_ranges_of_control_and_activation():
-    one = dataclasses.replace(PLAIN, control_range=(-1.0, 2.0), activation_range=(-0.5, 0.5))
-    assert [one.clamped(u) for u in (3.0, -3.0, 1.0)] == [2.0, -1.0, 1.0]
-    assert dataclasses.replace(one, dynamics="filter").clamped(3.0) == 0.5
 
 
 def test_controls_are_what_a_keyframe_states_else_the_targets_that_are_the_posture():
@@ -57,27 +48,3 @@ def test_which_actuators_take_part(changes, takes_part):
     assert (reason(one, 0.0) == "") is takes_part is bool(found.position_gain.any())
     assert set(found.left_out) == (set() if takes_part else {"servo"})
     assert (found.controls != (None,)) is takes_part
-
-
-@pytest.mark.parametrize("changes, field", [
-    ({"targets": 2.0}, "targets"), ({"targets": (2.0,)}, "targets"), ({"targets": (2.0, np.nan, 0.0, 0.0)}, "targets"),
-    ({"locked": ("wrist",)}, "locked"),
-])  # fmt: skip
-def test_what_cannot_be_a_scene_of_servos_is_refused(gripper, changes, field):
-    with pytest.raises(WrongField) as error:
-        gripper.case("mine", posture="open", torque="servos", **changes)
-    assert error.value.field == field and "\n" not in str(error.value)
-
-
-def test_a_robot_with_servos_has_two_scenes_of_them_and_one_without_none(gripper):
-    held, step = gripper.scenes[-2:]
-    assert held.torque == step.torque == "servos" and not np.any(held.targets)
-    assert step.targets == (6.0, 6.0, 0.02, 0.02) and "full only" in held.tags and "speed" in step.tags
-    assert [case.scene.torque for case in gripper.cases_of_torque] == ["hold", "free", "free"]
-    for case in gripper.cases[-2:]:  # no step is longer than 1 over the fastest rate, with the servos
-        slow, fast = (max(rates_at(tree, case.q)) for tree in (gripper.tree, case.tree))
-        assert slow < fast <= 1.0 / case.scene.dt
-    for name in ("loop", "mixed", "free_body"):
-        assert all(scene.torque != "servos" for scene in robot_of(read(PATHS[name]), name).scenes)
-    floating = robot_of(read(PATHS["quadruped"]), "quadruped").cases[-1]
-    assert floating.controller and not floating.scene.gravity

@@ -1,7 +1,6 @@
 """What breaks inside a run is a failed check, and the rest goes on; what is timed comes last."""
 
 import json
-import os
 import sys
 from functools import partial
 from types import SimpleNamespace
@@ -10,7 +9,7 @@ import pandas as pd
 from in_process import InProcess, without_workers
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
-from sections import row_of, section
+from sections import row_of
 
 from compare.__main__ import main
 from compare.cli import command_line
@@ -19,7 +18,7 @@ from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
-from compare.run import command, drawing
+from compare.run import command
 from compare.run import examine as experiment
 
 
@@ -111,20 +110,6 @@ def test_progress_counts_from_one():
     assert experiment.progress(clock, ["mass", "gravity", "speed"]) == ["2 of 3", "gravity"]
 
 
-def test_a_picture_of_several_experiments_is_drawn_with_the_last_of_them():
-    names = [name for name, record in EXPERIMENTS.items() if record.overview == EXPERIMENTS["mass"].overview]
-    sections = [section(name, rows=[{"a": 1}]) for name in names]
-    needed = [drawing.results_needed(name, list(EXPERIMENTS), sections) for name in names]
-    assert len(names) > 1 and not any(needed[:-1]) and list(needed[-1]) == names
-
-
-def test_a_process_that_is_ended_from_outside_is_no_failed_check(tmp_path, capsys, monkeypatch):
-    made(monkeypatch, "broken", rows=lambda setup: list(setup.map(os._exit, [3])))
-    only(monkeypatch, "broken")
-    assert ran(tmp_path, "broken") == (2, None)
-    assert len(capsys.readouterr().err.splitlines()) == 1 and list(tmp_path.iterdir()) == []
-
-
 class Writing(InProcess):
     """Draws in this process at once, and writes down when that is asked for."""
 
@@ -153,7 +138,7 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
     setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
-    sections, causes, skipped = experiment.examine(names, setup, tmp_path, Terminal(), Writing(log))
+    sections, causes, skipped = experiment.Run(names, setup, tmp_path, Terminal(), Writing(log)).examined()
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),
         ("rows", "trajectory"), ("figures", "trajectory"), ("rows", "speed"), ("rows", "derivatives"),
@@ -162,10 +147,3 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     for section_of_name, name in zip(sections, names):
         assert [figure.file for figure in section_of_name.figures] == [f"{name}_{k}" for k in range(3)]
-
-
-def test_figures_whose_names_differ_in_capitals_are_two_files(tmp_path, monkeypatch):
-    figures = [partial(plot, None, name) for name in ("first", "First")]
-    made(monkeypatch, "two", figures=lambda result, robot: figures)
-    assert drawing.draw("two", None, ARM, tmp_path, {}) == [("first", "A caption."), ("First_", "A caption.")]
-    assert sorted(path.name for path in tmp_path.glob("*.png")) == ["First_.png", "first.png"]

@@ -6,14 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from in_process import Lines
 from sections import BAD, section
-from small_runs import Lines
 from test_own_reference import IDLE, examined
 from test_own_reference import folder as folder
 
 from compare.engines.mujoco.dynamics import MujocoDynamics
 from compare.experiments.setup import Setup, engines
-from compare.run.examine import examine
+from compare.run.examine import Run
 from compare.run.explained import explained, lifted_less_work
 from compare.run.reference import compared_with
 
@@ -94,7 +94,7 @@ def test_a_wrong_number_of_a_file_explains_no_error_of_an_engine(tmp_path, monke
     """The forearm weighs 1.51 kg for 1.5; and MuJoCo's bias is off by 1e-9 N m."""
     bias = MujocoDynamics.bias
     monkeypatch.setattr(MujocoDynamics, "bias", lambda *a: bias(*a) + wrong)
-    sections, causes, _ = examine(NAMES, setup_of_heavy(tmp_path), tmp_path, Lines(), IDLE)
+    sections, causes, _ = Run(NAMES, setup_of_heavy(tmp_path), tmp_path, Lines(), IDLE).examined()
     assert causes[0].text.startswith("mass of forearm")
     assert {check.experiment for check in standing(sections)} == stands
     assert sections[2].name == "mass" and sections[2].explained

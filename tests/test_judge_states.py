@@ -7,7 +7,6 @@ import numpy as np
 import tmt
 from compare.robots import states
 from compare.robots.arm import ARM
-from compare.robots.states import Sample
 from compare.run.examine import Setup
 
 
@@ -58,18 +57,3 @@ def test_a_large_robot_gets_fewer_states_with_a_note():
     assert states.random(giant, 10, 5).notes == some.notes[1:]
     numbers = 3 * len(giant.tree.mass) * giant.coordinates.nv
     assert len(some.q) * numbers <= states.MOST_NUMBERS < (len(some.q) + 1) * numbers
-
-
-def test_the_first_states_of_a_sample_are_a_sample():
-    sample = Sample(ARM.tree, "some", *np.arange(27.0).reshape(3, 3, 3), 2, ("a", "b", "c"))
-    first = sample.first(2)
-    assert first.q.tolist() == sample.q[:2].tolist() and first.qd.tolist() == sample.qd[:2].tolist()
-    assert first.describe(1) == "b" and sample.first(3) is sample
-
-
-def test_exact_values_are_those_of_the_first_states_in_their_order():
-    sample = states.random(ARM, 10, 4)
-    q, qd, tau = (values[:4] for values in (sample.q, sample.qd, sample.tau))
-    assert np.allclose(sample.exact("mass_matrix").high, tmt.mass_matrix(q), rtol=1e-12)
-    assert np.allclose(sample.exact("acceleration").high, tmt.acceleration(q, qd, tau), rtol=1e-12)
-    assert np.allclose(sample.exact("jacobians", 1).high, tmt.jacobians(sample.q[:4])[1], atol=1e-14)

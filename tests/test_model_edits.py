@@ -11,9 +11,8 @@ from edited import XML, edited, setup_of, untimed_speed
 
 from compare.core.check import Result
 from compare.experiments import module, parameters, reduction, stability, trajectory
-from compare.report.verdict import Section
 from compare.robots.arm import ARM
-from compare.run.examine import Setup, new_causes
+from compare.run.examine import Setup, in_one
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
@@ -122,8 +121,6 @@ def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
 
 
 OF_A_SOLUTION = "rest"  # compared with a solution alone
-BODY = '<body name="forearm" pos="0 0 -0.3"'
-SERVO = EDITS["no forces of actuators"][:2]
 
 
 def found(text):
@@ -169,21 +166,6 @@ def test_causes_come_by_rank_then_by_size():
     assert causes[1].text.index("0.15 m") < causes[1].text.index("0.151 m")  # the stated number first
 
 
-def test_a_force_that_no_number_explains_is_the_cause():
-    both = places(edited(SERVO, ('mass="1.5"', 'mass="1.501"')))
-    assert {*both} == {"forces of actuators (actuator 0 on beta)", "mass of forearm"}
-    held = "</mujoco>", '<equality><joint joint1="gamma" polycoef="0.3 0 0 0 0"/></equality></mujoco>'
-    assert places(edited(held, ('constraint="disable" ', ""))) == ["forces of constraints and contacts"]
-
-
-def test_geoms_that_cannot_touch_are_no_cause():
-    """They are excluded, or MuJoCo has no contact stage."""
-    excluded = '<contact><exclude body1="world" body2="forearm"/></contact></mujoco>'
-    for stages in ('contact="disable"', 'constraint="disable"'):
-        assert places(TOUCHING.replace(STAGES_OFF, stages)) == []
-    assert places(TOUCHING.replace(STAGES_OFF, "").replace("</mujoco>", excluded)) == []
-
-
 def test_contacts_are_a_cause_if_geoms_touch_in_a_scene_or_at_a_random_state():
     (cause,) = found(TOUCHING.replace(STAGES_OFF, ""))[1]
     assert all(word in cause.text for word in ("floor and a geom of forearm touch", " s of zero, free"))
@@ -196,6 +178,8 @@ def test_contacts_are_a_cause_if_geoms_touch_in_a_scene_or_at_a_random_state():
 
 
 FINGERTIP = FOREARM.replace("0.15", "0.225").replace("1.5", "1.2")
+
+
 LOADED = '<inertial pos="0.18 0 0" mass="2" diaginertia="0.0011 0.0266 0.0266"/>'  # 0.5 kg at 0.27 m
 IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>'
 
@@ -222,6 +206,14 @@ def test_numbers_that_are_wrong_together_are_one_cause(edits, text):
     assert cause.text == text and cause.place == text.partition(":")[0]
 
 
+def test_a_slip_that_explains_several_numbers_is_the_cause_in_their_place():
+    upper_arm = '<inertial pos="0 0 -0.15" mass="1.9" diaginertia="0.015 0.014 0.002"/>'
+    setup = setup_of(edited((upper_arm, "@"), (FOREARM, upper_arm), ("@", FOREARM)), states=20, make=Setup)
+    several = parameters.rows(setup).causes
+    (cause,) = in_one(setup, several)
+    assert len(several) == 3 and cause.place == "masses, CoMs and inertias of upper arm and forearm"
+
+
 def test_what_is_wrong_for_another_reason_stays_another_cause():
     """One of three joints, a mass by another factor, an inertia as well."""
     edits = (BETA, f'{BETA} armature="0.1"'), (GAMMA, f'{GAMMA} armature="0.2"')
@@ -230,14 +222,3 @@ def test_what_is_wrong_for_another_reason_stays_another_cause():
     assert len(places(edited((FOREARM, FINGERTIP)))) == 2
     no_body = LOADED.replace("0.0011 0.0266", "0.0009 0.0266")  # has this inertia
     assert len(places(edited((FOREARM, no_body)))) == 3
-
-
-@pytest.mark.parametrize("edits, causes", [
-    # 90 degrees where radians are meant
-    ([(BODY, f'{BODY} euler="0 90 0"'), (GAMMA, f'{GAMMA} damping="0.1"')], ["zero of gamma", "damping of gamma"]),
-    ([(BETA, f'{BETA} pos="0.01 0 0"')], ["anchor x of beta", "com x of upper arm"]),
-])  # fmt: skip
-def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, causes):
-    setup = setup_of(edited(*edits), make=Setup, states=20)
-    sections = [Section("parameters", "", "", "", parameters.rows(setup))]
-    assert [cause.place for cause in new_causes(setup, sections, [])] == causes

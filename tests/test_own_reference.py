@@ -10,9 +10,8 @@ import numpy
 import numpy as np
 import own_equations
 import pytest
-from in_process import InProcess, answered
+from in_process import InProcess, Lines, answered
 from models import PATHS
-from small_runs import Lines
 
 from compare.core.text import say
 from compare.engines.own import OwnError
@@ -46,7 +45,7 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, wo
     reference, robot, mujoco, reading = compared_with(asked, str(mjcf), joints)
     of = {"states": states, "exact_states": 1, "finer": (1,), "size": "quick", "reading": reading}
     setup = Setup(robot, engines(mujoco, reference.own), **of)
-    sections, causes, _ = experiment.examine(names, setup, Path(mkdtemp(dir=folder)), Lines(), workers)
+    sections, causes, _ = experiment.Run(names, setup, Path(mkdtemp(dir=folder)), Lines(), workers).examined()
     failed = [check for section in sections for check in section.result.checks if not check.passed]
     return SimpleNamespace(sections=sections, causes=causes, robot=robot, failed=failed)
 
@@ -97,13 +96,6 @@ def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
         assert {check.experiment for check in run.failed} == {"acceleration", "diagnosis"}
 
 
-def test_trajectories_are_those_of_rk4(folder):
-    run = examined(folder, "mine.py:Object", ["trajectory"])
-    assert run.sections[0].result.checks and not run.failed
-    found = {(row.engine_integrator, row.level) for row in run.sections[0].result.rows}
-    assert found == {("RK4", level) for level in ("one step", "open loop")}
-
-
 def test_slow_equations_get_fewer_states_no_scenes_and_a_cause(folder):
     run = examined(folder, "mine.py:slow_sign", ["mass", "trajectory"], states=5000)
     mass, trajectory = (section.result for section in run.sections)
@@ -136,16 +128,6 @@ def test_what_nothing_explains_is_drawn_along_the_coordinate_that_tells_most(fol
     assert (curve.entry, curve.coordinate) == ("h[hip]", "knee") and not run.causes
     assert np.ptp(curve.yours - curve.right) == pytest.approx(2.0, rel=0.03)
     assert [name for name, _ in section.figures] == ["diagnosis_curve"]
-
-
-@pytest.mark.parametrize("asked, joints, right", [
-    ("mine.py:", "knee,hip", "hip,knee"), ("mine.py:swapped", None, "knee,hip"),
-    ("mine.py:swapped", "-knee,hip", "knee,hip"),
-])  # fmt: skip
-def test_the_right_joints_are_named_in_place_of_the_stated_ones(folder, asked, joints, right):
-    run = examined(folder, asked, ["diagnosis"], joints=joints)
-    mirrored = "-" + right.replace(",", ",-")  # the mirror image of the pendulum is the same
-    assert any(f"--joints={one})" in cause.text for cause in run.causes for one in (right, mirrored))
 
 
 def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, folder, capsys):

@@ -5,7 +5,7 @@ import pytest
 from edited import CART, XML, edited
 
 import tmt
-from compare.engines.mujoco import ModelError, read
+from compare.engines.mujoco import read
 from compare.engines.mujoco.inventory import contact_pairs
 from compare.engines.mujoco.source import Source
 from compare.robots.arm import ARM
@@ -102,13 +102,6 @@ def test_what_moves_otherwise_is_not_moved_nor_turned(text):
     assert placement.is_same and placement.tree is tmt.ARM and placement.remarks() == []
 
 
-def test_a_robot_that_is_turned_against_gravity_differs_in_gravity_alone():
-    placement = placed(tmt.ARM, read(moved('euler="0.3 0 0"')).tree)
-    (remark,) = placement.remarks()
-    assert not remark.values["is_with_gravity"] and remark.values["angle"] == pytest.approx(np.degrees(0.3))
-    assert np.abs(tmt.bias(*STATES[:2], placement.tree) - tmt.bias(*STATES[:2])).max() < 1e-13
-
-
 def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
     tree, q = read(CART).tree, np.array([0.3, 0.7, 0.5, 0.5, -0.5, 0.5])
     wrist = CART.replace('pos="0 0.01 0"', 'pos="0 0.02 0"')
@@ -116,21 +109,6 @@ def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
     assert placement.along == ("rail",) and not placement.is_moved and not placement.is_turned
     assert np.abs(tmt.mass_matrix(q, placement.tree) - tmt.mass_matrix(q, tree)).max() < 1e-14
     assert placed(tree, read(wrist).tree).is_same
-
-
-# M[alpha][alpha] is 0.2445 kg m2 at the position zero
-@pytest.mark.parametrize("inertia, is_negligible", [(2.4e-7, True), (2.5e-7, False)])
-def test_the_mass_of_a_link_stands_for_none_up_to_a_millionth_of_what_it_carries(inertia, is_negligible):
-    source = Source(AS_LINKS.replace(YOKE, YOKE + BY_LINK.format(inertia))).joined()
-    assert (source.model.body("yoke").mass[0] == 0.0) == is_negligible
-
-
-def test_bodies_stay_one_where_joints_are_locked(tmp_path):
-    (tmp_path / "file.xml").write_text(edited((FOREARM, SPLIT)))
-    compared = compared_with("arm", str(tmp_path / "file.xml"))
-    case = compared.robot.case(locked=("alpha", "gamma"))
-    q = STATES[0][:, 1:2]
-    assert np.abs(compared.mujoco.of(case).mass_matrix(q) - tmt.mass_matrix(q, case.tree)).max() < 1e-14
 
 
 def test_locked_joints_make_no_contacts_that_the_file_does_not_have():
@@ -144,9 +122,3 @@ def test_locked_joints_make_no_contacts_that_the_file_does_not_have():
         model = source.without({"alpha": 0.3, "beta": 0.2})
         assert len(contact_pairs(model)) == pairs and model.ngeom == source.model.ngeom == 2 + pairs
     assert len(contact_pairs(source.model)) == 2  # with the upper arm too, which moves there
-
-
-def test_a_moving_link_must_carry_mass():
-    leaf = AS_LINKS.replace(FOREARM, FOREARM + '<body name="tool" pos="0.3 0 0"><joint name="turn"/></body>')
-    with pytest.raises(ModelError, match="tool moves, and neither it nor what it carries has mass"):
-        Source(leaf)

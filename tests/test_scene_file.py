@@ -1,12 +1,15 @@
-"""Scenes of a user's own: what a file may say; what it may not is one line with file and entry."""
+"""Scenes: what a file may say, and what cannot be a scene of a robot; a scene changes what it says and nothing else."""
 
 import os
 
 import numpy as np
 import pytest
+from edited import XML
 from models import PATHS
 from runs import posix
 
+import tmt
+from compare.engines.mujoco import parse
 from compare.robots.arm import ARM
 from compare.robots.case import Case
 from compare.robots.scene_file import SceneError, read_scenes
@@ -90,12 +93,6 @@ def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length, ac
     assert np.allclose(Case(robot, scene).q, [*turn, 1.0, 0.0, 0.0, 0.0], rtol=0.0, atol=1e-15)
 
 
-def test_a_file_that_cannot_be_read(tmp_path):
-    with pytest.raises(SceneError, match=r"no\.toml"):
-        read_scenes(tmp_path / "no.toml", ARM)
-    refused(tmp_path, f"a = {'[' * 3000}{']' * 3000}", "nested")
-
-
 @posix
 def test_a_pipe_is_never_waited_for(tmp_path):
     os.mkfifo(tmp_path / "my.toml")
@@ -110,3 +107,29 @@ def test_the_number_of_steps_of_a_run_is_limited(tmp_path, steps, accepted):
         return refused(tmp_path, text, "20,000 steps")
     (scene,) = from_text(tmp_path, text)
     assert scene.steps == steps
+
+
+def test_a_case_keeps_the_gravity_and_the_damping_of_the_file():
+    moon = parse(XML.replace("0 0 -9.81", "0.5 -0.3 -1.62"), ARM.tree)
+    sticky = parse(XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.3"/>'), ARM.tree)
+    for case in ARM.cases:
+        gravity, damping = case.scene.gravity, case.scene.damping
+        of_moon = [0.5, -0.3, -1.62] if gravity else [0.0, 0.0, 0.0]
+        assert moon.of(case).model.opt.gravity.tolist() == of_moon
+        one, added = sticky.of(case), [0.3 * (name == "beta") for name in case.joints]
+        assert one.model.dof_damping[one.dofs].tolist() == [damping + more for more in added]
+        assert case.tree.gravity == (tmt.ARM.gravity if gravity else (0.0, 0.0, 0.0))
+        assert case.tree.damping == (damping,) * len(case.joints)
+
+
+def test_cases_that_differ_in_one_change_have_their_own_models():
+    changes = [
+        {}, {"gravity": False}, {"damping": 0.1}, {"damping": 0.1001}, {"locked": ("beta",)}, {"locked": ("gamma",)},
+        {"locked": ("beta",), "posture": (0.0, 40.0, 0.0)}, {"locked": ("beta",), "posture": (0.0, 40.001, 0.0)},
+        {"locked": ("beta",), "posture": (0.0, 40.0, 0.0), "gravity": False}, {"locked": ("alpha", "beta")},
+    ]  # fmt: skip
+    engine, cases = parse(XML, ARM.tree), [ARM.case("one", **change) for change in changes]
+    for case in cases[::-1] + cases:
+        q, v = np.full((2, len(case.joints)), 0.7)
+        found = engine.of(case).acceleration(q, v, v)
+        assert np.allclose(found, tmt.acceleration(q, v, v, case.tree), rtol=1e-10, atol=1e-10), case.scene

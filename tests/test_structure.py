@@ -1,4 +1,4 @@
-"""The parts of the project, the directions of their imports, and the types that may be anything."""
+"""The parts of the project, and the directions of their imports."""
 
 import ast
 import re
@@ -8,7 +8,6 @@ from dataclasses import fields
 from functools import cache
 from graphlib import TopologicalSorter
 
-import pytest
 from runs import ROOT
 
 from compare.experiments import Functions
@@ -16,18 +15,6 @@ from compare.experiments import Functions
 FILES, OF_TMT = (sorted((ROOT / package).rglob("*.py")) for package in ("compare", "tmt"))
 DIAGRAM = re.compile(r"^  (\S+) --> (\S+)$", re.MULTILINE)
 
-# what each part of compare may import of the others; of its own part: anything that makes no circle
-DIRECTIONS = {
-    "": "agreement core stability", "core": "", "process": "core", "robots": "tmt core", "judge": "tmt core robots",
-    "agreement": "tmt core diagnosis engines judge robots", "engines": "tmt core robots judge process",
-    "stability": "tmt core robots engines", "truth": "tmt core robots stability",
-    "diagnosis": "tmt core robots judge", "report": "core process robots",
-    "experiments": "tmt core robots engines stability truth judge diagnosis agreement report",
-    "run": "tmt core robots engines stability judge process report experiments", "cli": "core experiments process report",
-    "fleet": "tmt core robots engines judge process report experiments run cli",
-    "export": "tmt core robots engines judge process report experiments run cli",
-    "__main__": "tmt core robots engines judge process report experiments run cli fleet export",
-}  # fmt: skip
 # the modules of compare, or beginnings of their names, that may import a library
 LIBRARIES = {
     "mujoco": "engines.mujoco engines.mjx stability", "mujoco_warp": "engines.warp", "warp": "engines.newton engines.warp",
@@ -37,13 +24,7 @@ LIBRARIES = {
 }  # fmt: skip
 SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup"))
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
-PUBLIC = {"compare", "tmt"}  # whose __init__ gathers public names: nodes of their own
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
-# parameters and fields that have a class of this project, or one of its engines' or libraries'
-OURS = {
-    "case", "drawn", "engine", "figure", "model", "one", "reading", "reference", "report", "result", "robot",
-    "section", "setup", "tree",
-}  # fmt: skip
 
 
 def dotted(path) -> str:
@@ -93,10 +74,6 @@ def libraries(path) -> set[str]:
     return {name.split(".")[0] for name in imports(path)}
 
 
-def part(module) -> str:
-    return (module.split(".") + [""])[1]
-
-
 def test_tmt_imports_three_libraries_alone():
     """And its symbolic equations SymPy, which need not be installed."""
     always = {*sys.stdlib_module_names, "tmt", "numpy", "llvmlite", "mpmath"}
@@ -105,72 +82,39 @@ def test_tmt_imports_three_libraries_alone():
         assert not libraries(path) - allowed, path
 
 
-def test_imports_keep_their_directions():
-    """Those of libraries too; experiments are imported by name only, and not by each other."""
+def test_experiments_and_libraries_are_imported_where_they_belong():
+    """Experiments by name only, and not by each other."""
     for path in FILES:
-        mine, own = part(dotted(path)), dotted(path).split(".")[:3]
-        allowed = {mine, *DIRECTIONS.get(mine, "").split()}
         for name in modules_imported(path) - TMT:
+            is_free = name.startswith(SHARED) or name.split(".")[:3] == dotted(path).split(".")[:3]
             said = f"{dotted(path)} imports {name}"
-            assert part(name) in allowed, said
-            is_free = name.startswith(SHARED) or name.split(".")[:3] == own
             assert is_free or not name.startswith("compare.experiments."), said
-        assert "tmt" not in libraries(path) or "tmt" in allowed, path
         for library in libraries(path) & LIBRARIES.keys():
             drawn = library in DRAWING and path.stem.startswith("figures")
             homes = tuple(f"compare.{home}" for home in LIBRARIES[library].split())
             assert drawn or dotted(path).startswith(homes), f"{dotted(path)} imports {library}"
 
 
-@pytest.mark.parametrize("of_folders", [False, True])
-def test_there_is_no_circle(of_folders):
-    """Of files, imports for annotations left out; and of folders, whatever they import."""
+def test_there_is_no_circle():
+    """Of files, imports for annotations left out."""
     graph = TopologicalSorter()
-    pairs = {(dotted(path), name) for path in FILES + OF_TMT for name in modules_imported(path, of_folders)}
-    for pair in pairs - FOR_DOCSTRINGS:
-        importing, imported = (node_of(module, of_folders) for module in pair)
-        if importing != imported:
-            graph.add(importing, imported)
+    pairs = {(dotted(path), name) for path in FILES + OF_TMT for name in modules_imported(path, False)}
+    for importing, imported in pairs - FOR_DOCSTRINGS:
+        graph.add(importing, imported)
     graph.prepare()
 
 
-def node_of(module: str, of_folders: bool) -> str:
-    if module in PUBLIC:
-        return f"public names of {module}"
-    return folder(module) if of_folders else module
-
-
-def annotations(path):
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.arg) and node.annotation:
-            yield node.arg, node.annotation
-        elif isinstance(node, ast.AnnAssign):
-            yield ast.unparse(node.target), node.annotation
-
-
-def test_object_is_the_type_of_nothing_of_the_project():
-    """An import is never avoided by `object` where a class is meant; of a user's values any type is possible."""
-    untyped = set()
-    for path in FILES:
-        for name, annotation in annotations(path):
-            parts = {part.id for part in ast.walk(annotation) if isinstance(part, ast.Name)}
-            if "object" in parts and name in OURS:
-                untyped.add(f"{dotted(path)}: {name}")
-    assert not untyped
-
-
 def test_the_diagram_shows_the_imports_of_all_folders():
-    """An import that has no arrow follows from arrows; and no arrow is without an import."""
-    pairs = {
-        (folder(dotted(path)), folder(name)) for path in FILES + OF_TMT for name in modules_imported(path)
-    }
-    imported = {pair for pair in pairs if pair[0] != pair[1]}
+    """One that has no arrow follows from arrows; no arrow is without an import, and there is no circle."""
+    pairs = {(dotted(path), name) for path in FILES + OF_TMT for name in modules_imported(path)}
+    imported = {(folder(a), folder(b)) for a, b in pairs if folder(a) != folder(b)}
     arrows = set(DIAGRAM.findall((ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")))
     assert arrows <= imported
     reached = set(arrows)
     while more := {(a, d) for a, b in reached for c, d in arrows if b == c} - reached:
         reached |= more
     assert imported <= reached, "arrows are missing"
+    assert {a for a, b in reached if a == b} == {name for pair in FOR_DOCSTRINGS for name in pair}
 
 
 def test_the_types_of_every_module_are_checked():

@@ -44,48 +44,24 @@ what is wrong in the same words. Compiled code is kept on disk, see compiled/sto
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.answers import answered as _answered
 from tmt.answers import prepare
 from tmt.arm import ARM
+from tmt.export import equations
+from tmt.linear import Derivatives, Frame, derivatives, frame, inverse_dynamics_derivatives, step_derivatives
 from tmt.methods import METHODS
-from tmt.methods import method_named as _method_named
 from tmt.model.tree import Tree
-from tmt.model.tree import checked_model as _checked_model
-from tmt.model.values import real_numbers as _real_numbers
-from tmt.model.values import shown as _shown
 from tmt.simulation import Motion, simulate
 
 __all__ = [
-    "ARM", "METHODS", "Derivatives", "Frame", "Motion", "Tree", "acceleration", "angular_velocities", "bias", "com_positions",
-    "convective_terms", "derivatives", "energy", "equations", "frame", "gravity_balance", "inverse_dynamics",
-    "inverse_dynamics_derivatives", "inverse_mass_matrix", "jacobians", "mass_matrix", "potential_energy", "prepare",
-    "simulate", "spring_torque", "step_derivatives",
+    "ARM", "METHODS", "Derivatives", "Frame", "Motion", "Tree", "acceleration", "angular_velocities", "bias",
+    "com_positions", "convective_terms", "derivatives", "energy", "equations", "frame", "gravity_balance",
+    "inverse_dynamics", "inverse_dynamics_derivatives", "inverse_mass_matrix", "jacobians", "mass_matrix",
+    "potential_energy", "prepare", "simulate", "spring_torque", "step_derivatives",
 ]  # fmt: skip
-
-
-class Derivatives(NamedTuple):
-    """What `derivatives` returns, arrays (..., nv, nv): the derivative of row i by column j."""
-
-    dqdd_dq: np.ndarray  # 1/s2
-    dqdd_dqd: np.ndarray  # 1/s
-    dqdd_dtau: np.ndarray  # 1/(kg m2)
-    dtau_dq: np.ndarray  # N m/rad
-    dtau_dqd: np.ndarray  # N m s/rad
-
-
-class Frame(NamedTuple):
-    """What `frame` returns, in the inertial frame."""
-
-    position: np.ndarray  # (..., 3) m
-    rotation: np.ndarray  # (..., 3, 3)
-    jacobian: np.ndarray  # (..., 6, nv)
-    convective: np.ndarray  # (..., 6)
 
 
 def com_positions(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
@@ -115,7 +91,7 @@ def angular_velocities(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.nda
 
 
 def jacobians(q: ArrayLike, model: Tree = ARM) -> tuple[np.ndarray, np.ndarray]:
-    """T_b = dx_b/dq in the inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
+    """T_b = dx_b/dq, inertial frame, m/rad, and B_b with omega_b = B_b qd in body axes; both (..., m, 3, nv).
 
     B_b has unit 1. Assignment, parts d and e.
     q (..., nq): positions, rad.
@@ -141,7 +117,7 @@ def convective_terms(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> tuple[np
 
 
 def mass_matrix(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, shape (..., nv, nv), symmetric positive definite.
+    """Reduced mass matrix Mbar = sum T' m T + B' I B, kg m2, (..., nv, nv), symmetric positive definite.
 
     Assignment, part e.
     q (..., nq): positions, rad.
@@ -172,7 +148,7 @@ def bias(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     It is -Qbar at tau = 0 (assignment, part e) without the joint damping D, and MuJoCo's qfrc_bias.
     q (..., nq), qd (..., nv): positions and speeds, rad and rad/s.
 
-    >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the arm hangs, the elbow turns
+    >>> print(tmt.bias([0.0, 0.0, np.pi / 2], [0.0, 0.0, 5.0]).round(9) + 0.0)  # the elbow of a hanging arm
     [0. 0. 0.]
     """
     return _answered("bias", model, q, qd)
@@ -191,7 +167,7 @@ def gravity_balance(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
 
 
 def spring_torque(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Torque k (q - rest) that holds the springs of the joints, N m, shape (..., nv): of a ball k times the turn from its rest.
+    """Torque k (q - rest) that holds the springs of the joints, N m, (..., nv); of a ball k times the turn.
 
     With `gravity_balance` it is the torque that holds the model at rest.
     q (..., nq): positions, rad.
@@ -217,7 +193,7 @@ def acceleration(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM)
 
 
 def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives accelerations qdd, N m, shape (..., nv).
+    """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives qdd, N m, shape (..., nv).
 
     The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it
     is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. P, S: as in `acceleration`.
@@ -230,91 +206,8 @@ def inverse_dynamics(q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = 
     return _answered("inverse_dynamics", model, q, qd, qdd)
 
 
-def derivatives(q: ArrayLike, qd: ArrayLike, tau: ArrayLike, model: Tree = ARM) -> Derivatives:
-    """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd, each (..., nv, nv).
-
-    Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by
-    qd; dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by
-    turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
-    three slides and a ball, by the position of its origin in the inertial frame, then by turns in its own
-    axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so.
-    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m.
-
-    >>> q, rest = np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)
-    >>> by = tmt.derivatives(q, rest, rest)  # the arm hangs
-    >>> print(by.dtau_dq.round(9)[2, 2])  # 1.5 9.81 0.15
-    2.20725
-    """
-    return Derivatives(*_answered("derivatives", model, q, qd, tau))
-
-
-def inverse_dynamics_derivatives(
-    q: ArrayLike, qd: ArrayLike, qdd: ArrayLike, model: Tree = ARM
-) -> tuple[np.ndarray, np.ndarray]:
-    """Exact derivatives of `inverse_dynamics` by q, N m/rad, and by qd, N m s/rad, each (..., nv, nv).
-
-    By q means by movements, see `derivatives`; the derivative by qdd is `mass_matrix`.
-    q (..., nq), qd (..., nv), qdd (..., nv): positions, speeds and accelerations, rad, rad/s and rad/s2.
-
-    >>> rest = np.zeros(3)
-    >>> dtau_dq, dtau_dqd = tmt.inverse_dynamics_derivatives([0.0, 0.0, np.pi / 2], rest, rest)
-    >>> print(dtau_dq.round(9)[2, 2], dtau_dqd[2, 2])  # gravity; the arm has no damping
-    2.20725 0.0
-    """
-    return _answered("inverse_dynamics_derivatives", model, q, qd, qdd)
-
-
-def step_derivatives(
-    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, method: str = "rk4", model: Tree = ARM
-) -> tuple[np.ndarray, np.ndarray]:
-    """Exact derivatives A = dx+/dx (..., 2 nv, 2 nv) and B = dx+/dtau (..., 2 nv, nv) of one step, x = (movement, qd).
-
-    The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it
-    from the q that it reaches. Of an adaptive method the step is one of its own, of that size.
-    q (..., nq), qd (..., nv), tau (..., nv): positions, speeds and torques, rad, rad/s and N m; dt (...): the
-    step, s, above 0; method: a key of METHODS. ValueError also where an implicit method does not find its
-    stages.
-
-    >>> A, B = tmt.step_derivatives([0.0, 0.0, np.pi / 2], [0.0] * 3, [0.0] * 3, 0.01, "semi_implicit_euler")
-    >>> print(A.shape, B.shape, A[2, 5].round(9))  # dq+ = dt dqd+
-    (6, 6) (6, 3) 0.01
-    """
-    _checked_model(model)
-    _method_named(method)
-    steps = _real_numbers(dt)
-    if steps is None or not steps.size or not ((steps > 0.0) & (steps < np.inf)).all():
-        raise ValueError(f"dt is {_shown(dt)}; a step in s above 0 is expected")
-    both = _answered(f"step_derivatives:{method}", model, q, qd, tau, steps[..., None])
-    return both[..., : 2 * model.coordinates.nv], both[..., 2 * model.coordinates.nv :]
-
-
-def frame(name: str, q: ArrayLike, qd: ArrayLike | None = None, model: Tree = ARM) -> Frame:
-    """Pose of a site or body, its Jacobian J (..., 6, nv) and J' qd = dJ/dt qd (..., 6), all in the inertial frame.
-
-    J qd is the velocity of the frame's origin, m/s, and then its angular velocity, rad/s: MuJoCo's mj_jac,
-    jacp above jacr. J' qd, m/s2 and rad/s2, is what both accelerations are at qdd = 0 (mj_jacDot times qd).
-    The rotation takes components in the frame to inertial ones. name: a site of the model (see Tree), or a
-    body: then the frame is that of its joint, with body axes.
-    q (..., nq), qd (..., nv): positions and speeds, rad and rad/s; without qd at rest.
-
-    >>> tool = dataclasses.replace(
-    ...     tmt.ARM, site_names=["tool"], site_joint=[2], site_offset=[(0.3, 0.0, 0.0)]
-    ... )
-    >>> print(tmt.frame("tool", [0.0, 0.0, 0.0], [0.0, 0.0, 2.0], tool).convective[:3] + 0.0)  # 0.3 m (2 rad/s)^2
-    [-1.2  0.   0. ]
-    """
-    _checked_model(model)
-    known = dict.fromkeys([*model.site_names, *model.body_names])
-    if not isinstance(name, str) or name not in known:
-        raise ValueError(f"there is no site or body {_shown(name)}; the model has {', '.join(known)}")
-    speeds = np.zeros(model.coordinates.nv) if qd is None else qd
-    pose, jacobian = (_answered(f"frame_{part}:{name}", model, q) for part in ("pose", "jacobian"))
-    convective = _answered(f"frame_convective:{name}", model, q, speeds)
-    return Frame(pose[..., 3], pose[..., :3], jacobian, convective)
-
-
 def potential_energy(q: ArrayLike, model: Tree = ARM) -> np.ndarray:
-    """Potential energy V, J, shape (...), zero with every centre of mass at the height of the origin, and springs at rest.
+    """Potential energy V, J, shape (...); 0 with all centres of mass at the origin's height, springs at rest.
 
     q (..., nq): positions, rad.
 
@@ -334,46 +227,3 @@ def energy(q: ArrayLike, qd: ArrayLike, model: Tree = ARM) -> np.ndarray:
     -9.3121
     """
     return _answered("energy", model, q, qd)
-
-
-def equations(
-    model: Tree = ARM,
-    language: str = "c",
-    quantities: Sequence[str] = ("mass_matrix", "bias", "acceleration"),
-    *,
-    name: str = "robot",
-    single: bool = False,
-    head: Sequence[str] = ("Not checked.",),
-    parameters: Sequence[str] = (),
-    limit: float = 60.0,
-) -> str:
-    """The equations of a model, with its numbers, as text in another language, for use without this package.
-
-    Parameters
-    ----------
-    model : Tree, default ARM
-    language : {"c", "c header", "python", "matlab", "casadi", "jax", "latex", "html", "sympy"}
-        C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
-        states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
-        with a symbol for each parameter, for some six hinges and slides (needs SymPy).
-    quantities : functions of this package, by name; with symbols mass_matrix, bias, gravity_balance.
-        Of a step [A B], as "step_derivatives:rk4"; of a frame "frame_pose:hand", "frame_jacobian:hand" and
-        "frame_convective:hand".
-    name : of the file, which begins the names of C functions.
-    single : float in C.
-    head : lines that begin the comment at its head.
-    parameters : numbers that are further arguments of each function
-        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it;
-        "payload" and then a body's name: what that carries besides. They are in the frame that is the site of
-        the body's name, else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
-    limit : s
-        With symbols: the most work, counted as that of one processor core; ValueError beyond.
-
-    Examples
-    --------
-    >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
-    return out.reshape(*batch, 3)
-    """
-    from tmt.export import text  # loads the compiler
-
-    return text(model, language, quantities, name, single, head, parameters, limit)

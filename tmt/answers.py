@@ -1,4 +1,4 @@
-"""Who answers the public functions: NumPy calls of up to SMALL states, machine code larger ones and those of a prepared model.
+"""Who answers the public functions: NumPy up to SMALL states, machine code more, and prepared models.
 
 Nothing depends on earlier calls: the same call gives the same bits. Compiled code answers where nothing is
 wrong with what is given; whatever is, the literal form says.
@@ -37,7 +37,6 @@ def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
 
 
 def answers_of(model: Tree) -> "Answers":
-    """What is compiled of a model; of the prepared ones and the last others."""
     answers = all_answers.get(id(model))
     if answers is None:
         others = [key for key, answers in list(all_answers.items()) if not answers.prepared]
@@ -48,7 +47,7 @@ def answers_of(model: Tree) -> "Answers":
 
 
 def prepare(model: Tree = ARM, *quantities: str) -> None:
-    """Have machine code answer all calls of a model from now on: for many calls of one state, in a loop or a controller.
+    """Have machine code answer all calls of a model from now on: for many calls, in a loop or a controller.
 
     Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first
     time on a machine all take about a second for an arm and several for a humanoid; derivatives take longer
@@ -77,8 +76,6 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
 
 
 class Answers:
-    """What machine code answers of a model: large calls, and all of the quantities that are prepared."""
-
     def __init__(self, tree: Tree):
         self.tree = tree  # held, so that no other has its id
         self.evaluators: dict[str, Evaluator] = {}
@@ -92,7 +89,7 @@ class Answers:
         return self.evaluators[quantity]
 
     def by_machine_code(self, quantity: str, arguments: tuple[Any, ...]) -> Any:
-        """The quantity of states; None where NumPy is to answer: of few states, and where something is wrong."""
+        """The quantity of states; None where NumPy is to answer: few states, or something is wrong."""
         prepared = self.prepared.get(quantity)
         may_be_singular = self.may_be_singular and quantity in literal.SOLVED
         if prepared and not may_be_singular:

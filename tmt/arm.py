@@ -20,8 +20,6 @@ COM1 = 0.15  # m, shoulder to CoM of the upper arm: d/2
 COM2 = 0.15  # m, elbow to CoM of the forearm: 0.4 e, written out because 0.4 * 0.375 rounds to another double
 I1 = (0.015, 0.0, 0.0), (0.0, 0.014, 0.0), (0.0, 0.0, 0.002)  # kg m2, about the CoM, in body axes
 I2 = (0.001, 0.0, 0.0), (0.0, 0.019, 0.0), (0.0, 0.0, 0.019)  # kg m2
-
-
 ARM = Tree(
     joint_names=("alpha", "beta", "gamma"),  # shoulder, shoulder, elbow
     parent=(-1, 0, 1),

@@ -1,7 +1,7 @@
-"""The public functions in the literal form: the method as it stands in method.py, with NumPy, nothing compiled.
+"""The public functions in the literal form: method.py with NumPy, nothing compiled.
 
-It answers small requests, and says what is wrong with what is given. Comparisons ask for it by name: what the functions of the
-package return is compared with it. Arguments, results and errors are those of the functions of the same names in `tmt`.
+It answers small requests, says what is wrong with what is given, and is what other forms are compared with.
+Arguments, results and errors are those of the functions of the same names in `tmt`.
 """
 
 from collections.abc import Callable
@@ -47,7 +47,6 @@ def literal(name: str) -> Callable[..., Any]:
 
 
 def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
-    """The quantity of that full name at states in arrays by name, of which all are checked."""
     checked_model(tree)
     quantity, checked = quantity_of(name), states(tree, **arrays)
     batch = checked[0].shape[:-1]
@@ -66,7 +65,6 @@ def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
 def step_derivatives(
     method: str, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: np.ndarray
 ) -> np.ndarray:
-    """[A B] (..., 2 nv, 3 nv) of a step of the method of that name."""
     try:
         values = transition(method_named(method), tree, q, qd, tau, dt[..., 0])
     except (ArithmeticError, np.linalg.LinAlgError) as error:
@@ -86,7 +84,7 @@ def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
 
 
 def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None) -> np.ndarray:
-    """Nested scalars as an array, the batch shape in front; overflow: what is not finite is that, or an error."""
+    """Nested scalars as an array, the batch first; overflow: for what is not finite, None: an error."""
 
     def lists(item: Scalar) -> Scalar:
         if isinstance(item, (float, np.ndarray)):

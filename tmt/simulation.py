@@ -54,10 +54,10 @@ class Motion(_Path):
 
 
 def simulate(
-    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4", model: Tree = ARM,
-    tolerance: float | None = None, every: int = 1,
+    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4",
+    model: Tree = ARM, tolerance: float | None = None, every: int = 1,
 ) -> Motion:  # fmt: skip
-    """Motion under constant torque: t (records,) s, q (..., records, nq) and qd (..., records, nv), rad and rad/s.
+    """Motion under constant torque: t (records,), s; q (..., records, nq), rad; qd (..., records, nv), rad/s.
 
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar
     is singular, Newton's method does not find the stages of an implicit method, an adaptive method would need
@@ -98,15 +98,16 @@ def simulate(
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9
     tolerance = usual if tolerance is None else values.positive("tolerance", tolerance, "a number")
-    batch, *start = starts(model, q, qd, tau)
-    runs = len(start[0])
+    state = values.states(model, q=q, qd=qd, tau=tau)
+    batch, runs = state[0].shape[:-1], math.prod(state[0].shape[:-1])
+    *start, torque = (np.ascontiguousarray(part).reshape(runs, part.shape[-1]) for part in state)
     # whether Mbar is singular is looked at in each step
     within = every if taylor or model.never_singular else 1
     path_q, path_qd = values.paths(runs, steps, within, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
         sizes = f"dt is {dt:g} and steps is {shown(steps)}"
         raise ValueError(f"{sizes}; their product is beyond the largest double")
-    path_q[:, 0], path_qd[:, 0], torque = start
+    path_q[:, 0], path_qd[:, 0] = start
     if taylor:
         ended, evaluations = by_series(model, path_q, path_qd, torque, dt, every, tolerance)
     else:
@@ -118,15 +119,7 @@ def simulate(
     return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
 
 
-def starts(model: Tree, q: Any, qd: Any, tau: Any) -> tuple[Any, ...]:
-    """The batch shape, and q (runs, nq), qd and tau (runs, nv), contiguous, after all checks."""
-    state = values.states(model, q=q, qd=qd, tau=tau)
-    batch = state[0].shape[:-1]
-    return batch, *(np.ascontiguousarray(part).reshape(math.prod(batch), part.shape[-1]) for part in state)
-
-
 def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float) -> Ended:
-    """Write the true motions to the paths (runs, records, nq and nv), which hold the starts: why each ended, and the steps."""
     from tmt.exact.motion import followed  # here, so that `import tmt` need not wait for it
 
     ended, count, steps = np.full(len(q), None, dtype=object), 0, (q.shape[1] - 1) * every
@@ -141,10 +134,10 @@ def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int
 
 
 def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance: float) -> Array:
-    """Why each run ended, (runs,) of str or None; where Mbar was singular its states are made NaN from there on.
+    """Why each run ended, (runs,) of str or None; its states are NaN from where Mbar was singular.
 
-    q, qd: the paths (runs, records, nq and nv), of each step where Mbar may be singular; codes (runs, 2): why the compiled loop
-    ended each, 0: it did not, and after how many steps.
+    q, qd: the paths (runs, records, nq and nv), of each step where Mbar may be singular; codes (runs, 2): why
+    the compiled loop ended each, 0: it did not, and after how many steps.
     """
     ended = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
@@ -165,7 +158,6 @@ def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance:
 
 
 def singular_in(tree: Tree, q: Array, qd: Array) -> tuple[int, str] | None:
-    """The first of start, last and that before the largest change of rates where Mbar is singular; why."""
     if tree.never_singular:
         return None
     alive = int(np.isfinite(q[:, 0]).sum())

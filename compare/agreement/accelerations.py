@@ -1,4 +1,4 @@
-"""Accelerations alone: as a function of the torque they are affine, so they have a mass matrix, a bias and inputs."""
+"""Accelerations alone are affine in the torque, so they have a mass matrix, a bias and inputs."""
 
 from functools import partial
 from typing import NamedTuple
@@ -57,8 +57,7 @@ class Affine(NamedTuple):
         still = scale.acceleration(scale.force(), qdd)
         of_slopes = still[:, :, None] / size[:, None, :] + np.abs(slopes)
         allowed = LARGER * rounding * np.abs(M) @ of_slopes @ np.abs(M)
-        of_h = np.einsum("sij,sj->si", allowed, np.abs(qdd)) + LARGER * rounding * (
-            np.einsum("sij,sj->si", np.abs(M), still) + scale.force()
-        )
+        forces = np.einsum("sij,sj->si", np.abs(M), still) + scale.force()
+        of_h = np.einsum("sij,sj->si", allowed, np.abs(qdd)) + LARGER * rounding * forces
         values = Values(q, qd, M, self.bias(q, M, qd), (allowed, of_h))
         return values, partial(self.bias, q, M)

@@ -70,8 +70,8 @@ class Comparison:
     """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`."""
 
     def __init__(
-        self, mjcf: Any, quantities: Mapping[str, Any], q: Any, qd: Any, tau: Any, joints: Sequence[str] | None,
-        rtol: float, states: int, seed: int,
+        self, mjcf: Any, quantities: Mapping[str, Any], q: Any, qd: Any, tau: Any,
+        joints: Sequence[str] | None, rtol: float, states: int, seed: int,
     ) -> None:  # fmt: skip
         self.brought = {name: value for name, value in quantities.items() if value is not None}
         if not self.brought:
@@ -99,11 +99,7 @@ class Comparison:
         self.take_random(states, seed)
 
     def read(self, mjcf: Any) -> None:
-        from ..engines.mujoco import (
-            engine,
-            read,
-            tree_with_sites,
-        )  # here, so that `import compare` need not wait for it
+        from ..engines.mujoco import engine, read, tree_with_sites  # here: `import compare` need not wait
 
         self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
         self.robot = robot_of(self.reading, "the model")
@@ -160,10 +156,12 @@ class Comparison:
         self.problems = [problem.text for problem in equations.problems] if equations is not None else []
         return values
 
-    def asked(self, source: object, name: str) -> np.ndarray:
-        """A quantity of an engine at the states."""
-        state = (self.q, self.qd, self.tau)[: QUANTITIES[name].arguments]
-        return np.asarray(getattr(source, METHOD_NAMES[name])(*state))
+    def asked(
+        self, source: object, name: str, q: np.ndarray | None = None, qd: np.ndarray | None = None
+    ) -> np.ndarray:
+        """A quantity of an engine at the states, or at others."""
+        state = self.q if q is None else q, self.qd if qd is None else qd, self.tau
+        return np.asarray(getattr(source, METHOD_NAMES[name])(*state[: QUANTITIES[name].arguments]))
 
     def table(self, name: str, brought: object) -> np.ndarray:
         """An array of the user's values in the model's joints; a row may hold Mbar flattened by rows."""
@@ -188,11 +186,6 @@ class Comparison:
     def own(self, name: str) -> Callable[[np.ndarray], np.ndarray]:
         """Takes a quantity to the user's joints."""
         return self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
-
-    def of_mujoco(self, name: str, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
-        """MuJoCo's quantity at other states, in the user's joints."""
-        state = (q, qd, self.tau)[: QUANTITIES[name].arguments]
-        return self.own(name)(np.asarray(getattr(self.mujoco, METHOD_NAMES[name])(*state)))
 
     def scale(self, name: str, right: np.ndarray) -> np.ndarray:
         """The scale of each entry of a quantity, in the model's joints. right: MuJoCo's values."""

@@ -1,4 +1,4 @@
-"""What is wrong with a table of values, rather than with equations: a few of its rows, their order, its columns."""
+"""What is wrong with a table of values rather than with equations: some rows, their order, columns."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -49,12 +49,8 @@ def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Ite
         rounded = 0.5 * 10.0**-digits + rounding_of_states(comparison, name).reshape(count, -1)
         if (np.abs(yours - right) <= rounded * (1.0 + SECOND_ORDER) + tolerance).all():
             least = over(np.abs(compared.yours - compared.right), compared.scale).max()
-            yield slip(
-                "rounded",
-                decimals=digits,
-                rtol=float(f"{least:.0e}") * 2.0,
-                of_states=bool((rounded > 10.0**-digits).any()),
-            )
+            of_states = bool((rounded > 10.0**-digits).any())
+            yield slip("rounded", decimals=digits, rtol=float(f"{least:.0e}") * 2.0, of_states=of_states)
     rows = np.flatnonzero(wrong.any(axis=1)).tolist()
     if len(rows) <= FEW * count:
         at = np.argwhere(wrong)[:SHOWN].tolist()
@@ -88,7 +84,8 @@ def rounding_of_states(comparison: Comparison, name: str) -> ndarray:
     for key, unit in product((key for key, digits in sizes.items() if digits), np.eye(coordinates.nv)):
         step = 0.5 * 10.0 ** -float(sizes[key] or 0) * unit
         moved = rows | {key: coordinates.move(comparison.q, step) if key == "q" else comparison.qd + step}
-        total += np.abs(comparison.of_mujoco(name, moved["q"], moved["qd"]) - right)
+        value = comparison.asked(comparison.mujoco, name, moved["q"], moved["qd"])
+        total += np.abs(comparison.own(name)(value) - right)
     return total
 
 
@@ -99,9 +96,6 @@ def columns_exchanged(yours: ndarray, right: ndarray, tolerance: ndarray, wrong:
         return {}
     off = np.abs(yours[:, columns, None] - right[:, None, columns])
     same = (off <= tolerance[:, columns, None] + tolerance[:, None, columns]).all(axis=0)
-    is_explained = same.any(axis=1).all()
-    return (
-        dict(zip(columns.tolist(), columns[same.argmax(axis=1)].tolist()))
-        if is_explained and len(columns)
-        else {}
-    )
+    if not (len(columns) and same.any(axis=1).all()):
+        return {}
+    return dict(zip(columns.tolist(), columns[same.argmax(axis=1)].tolist()))

@@ -16,8 +16,9 @@ from .comparison import origin_of
 def tree(mjcf: str | PathLike[str] | Any, *, floating: bool = False) -> tmt.Tree:
     """The Tree of a robot's file: its joints and bodies with the numbers that MuJoCo compiles.
 
-    Joints and bodies have the names and the order of the file; a free joint b is three slides b x, b y, b z and a
-    ball b turn, with q, qd and tau as in MuJoCo. The frames of all bodies and sites are its sites, for `tmt.frame`.
+    Joints and bodies have the names and the order of the file; a free joint b is three slides b x, b y, b z
+    and a ball b turn, with q, qd and tau as in MuJoCo. The frames of all bodies and sites are its sites, for
+    `tmt.frame`.
 
     Parameters
     ----------
@@ -32,8 +33,8 @@ def tree(mjcf: str | PathLike[str] | Any, *, floating: bool = False) -> tmt.Tree
     Warns
     -----
     UserWarning
-        One line with all that the file has and the Tree has not: contacts, limits, friction, actuators, equalities,
-        tendons, fluid, gravity compensation. One for a base that is fixed, and one for meshes that cannot be read.
+        One line with all that the file has and the Tree has not: contacts, limits, friction, actuators,
+        equalities, tendons, fluid, gravity compensation. One for a fixed base, and one for unread meshes.
 
     Examples
     --------

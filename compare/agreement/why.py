@@ -1,7 +1,7 @@
 """The probable cause of a difference: in Mbar and h, or in the accelerations alone."""
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -135,7 +135,7 @@ def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -
         return solved
     own = affine.values(q, qd, rounding)
     if own is None:
-        return of_inputless(asked, affine, right, tau, qdd)
+        return of_forces(asked, right, tau, qdd)
     functions = (own[1], asked.stated, affine.mass_matrix) if equations.seconds <= QUICK else ()
     diagnosis = diagnose(tree, own[0], SECONDS_OF_CAUSE, *functions)
     return Why(diagnosis.sentence(), bool(diagnosis.causes), diagnosis.causes)
@@ -143,30 +143,13 @@ def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -
 
 def of_inputs(asked: Asked, factors: ndarray, left_over: LeftOver) -> Why:
     """Torques that act with other factors, and what else acts; left_over: with these factors."""
-    wrong = [
-        (asked.coordinates.speeds[i], float(x)) for i, x in enumerate(factors) if abs(x - 1.0) > CONSTANT
-    ]
-    causes = tuple(
-        Cause(rank=2, kind="input", place=f"tau of {name}", stated=1.0, explains=x, unit="times")
-        for name, x in wrong
-    )
+    named = zip(asked.coordinates.speeds, factors.tolist())
+    wrong = [(name, x) for name, x in named if abs(x - 1.0) > CONSTANT]
+    about: dict[str, Any] = {"rank": 2, "kind": "input", "stated": 1.0, "unit": "times"}
+    causes = tuple(Cause(place=f"tau of {name}", explains=x, **about) for name, x in wrong)
     text = say(Finding("agreement", "inputs", {"factors": wrong}))
     is_found = left_over.ratio <= 1.0 or bool(left_over.causes)
     return Why(f"{text} {left_over.sentence()}".rstrip(), is_found, causes + left_over.causes)
-
-
-def of_inputless(asked: Asked, affine: Affine, right: Values, tau: ndarray, qdd: ndarray) -> Why:
-    """Torques of some joints that change nothing, so that the accelerations have no mass matrix."""
-    slopes = affine.slopes(right.q)
-    idle = ~(np.abs(slopes) > CONSTANT * np.abs(slopes).max(initial=1.0)).any(axis=(0, 1))
-    if not idle.any():
-        return Why(say(Finding("agreement", "accelerations_alone")), False)
-    left_over = LeftOver(asked.tree, right, tau * ~idle, qdd, asked.rounding)
-    idle_alone = of_inputs(asked, 1.0 - idle, left_over)
-    if left_over.ratio <= 1.0 or left_over.causes:
-        return idle_alone
-    more = of_forces(asked, right, tau * ~idle, qdd)
-    return Why(f"{idle_alone.text} {more.text}", more.is_found, idle_alone.causes + more.causes)
 
 
 def of_forces(asked: Asked, right: Values, tau: ndarray, qdd: ndarray) -> Why:

@@ -5,6 +5,7 @@ import shlex
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from difflib import get_close_matches
+from functools import partial
 from textwrap import fill
 from typing import Any, NamedTuple, NoReturn
 
@@ -16,6 +17,7 @@ from ..process.streams import PROGRAM
 FLEET, EQUATIONS = "fleet", "equations"  # further commands, with options of their own
 LINE_WIDTH = 80
 HIGHEST_GAIN = 1e12
+ROBOT = " --mjcf robot.xml"  # of an example
 TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
 
@@ -65,11 +67,7 @@ def number(noun: str, least: float, most: float, kind: type[int | float] = float
     return in_range
 
 
-def seconds(most: float, least: float = 1e-6) -> Callable[[str], float]:
-    """A type of options: a time, s."""
-    return number("time in s", least, most)
-
-
+seconds = partial(number, "time in s", 1e-6)  # to be called with the longest time
 process_count = number("number of processes", 1, 1024, int)
 
 
@@ -100,26 +98,20 @@ OPTIONS = {
     "--mjcf": Option(metavar="FILE", of_every=True),
     "--floating": Option(None, of_every=True),
     "--reference": Option(stated_reference, "WHAT", of_every=True),
-    "--joints": Option(metavar="LIST", example=" --mjcf robot.xml --reference my_equations.py:"),
+    "--joints": Option(metavar="LIST", example=f"{ROBOT} --reference my_equations.py:"),
     "--scenes": Option(metavar="FILE", example=" --scenes my.toml"),
-    "--engines": Option(metavar="LIST", example=" --mjcf robot.xml --engines drake,mjx"),
-    "--dt": Option(seconds(5.0), "S", example=" --mjcf robot.xml --integrator Euler --dt 0.001"),
+    "--engines": Option(metavar="LIST", example=f"{ROBOT} --engines drake,mjx"),
+    "--dt": Option(seconds(5.0), "S", example=f"{ROBOT} --integrator Euler --dt 0.001"),
     "--integrator": Option(metavar="NAME"),
     "--posture": Option(metavar="NAME|NUMBERS"),
-    "--control-period": Option(
-        seconds(1.0), "S", example=" --mjcf robot.xml --control-period 0.02 --delay 0.004"
-    ),
-    "--delay": Option(seconds(1.0, 0.0), "S"),
+    "--control-period": Option(seconds(1.0), "S", example=f"{ROBOT} --control-period 0.02 --delay 0.004"),
+    "--delay": Option(number("time in s", 0.0, 1.0), "S"),
     "--kp": Option(number("gain", 0.0, HIGHEST_GAIN), "KP"),
     "--kv": Option(number("gain", 0.0, HIGHEST_GAIN), "KV"),
     "--at-speed": Option(None),
-    "--error": Option(
-        number("error", 1e-12, 1.0),
-        "E",
-        example=" --mjcf robot.xml --error 0.001 --write small.xml",
-    ),
+    "--error": Option(number("error", 1e-12, 1.0), "E", example=f"{ROBOT} --error 0.001 --write small.xml"),
     "--points": Option(metavar="NAMES"),
-    "--controls": Option(metavar="CSV", example=" --mjcf robot.xml --controls recorded.csv"),
+    "--controls": Option(metavar="CSV", example=f"{ROBOT} --controls recorded.csv"),
     "--write": Option(metavar="FILE"),
 }
 

@@ -108,17 +108,9 @@ class Result:
         self.notes.append(self.finding(kind, of, **values))
 
     def check(
-        self,
-        scene: str,
-        quantity: str,
-        value: float | None,
-        tolerance: float,
-        unit: str,
-        note: str = "",
-        rounding: bool = False,
-        rule: str = "at most",
-        about: About = About.MODELS,
-    ) -> Check:
+        self, scene: str, quantity: str, value: float | None, tolerance: float, unit: str, note: str = "",
+        rounding: bool = False, rule: str = "at most", about: About = About.MODELS,
+    ) -> Check:  # fmt: skip
         """Add a check; a value that is None or not finite fails."""
         number = None if value is None or not np.isfinite(value) else float(value)
         numbers = number, float(tolerance), unit

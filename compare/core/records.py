@@ -26,6 +26,8 @@ class Experiment:
     states_causes: bool = False  # its failing checks are the causes of the others
     compares: bool = True  # if not, it only says why others fail
     overview: str = ""  # the picture of the first screen that its result is part of
+    # the kinds of its `top` that are on the first screen of a run of several; the others stand in its section
+    first_screen: tuple[str, ...] = ()
 
 
 def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]:

@@ -1,8 +1,9 @@
-"""Conventions in which right equations look different: order, senses, zeros and units of the joints, angles from the
-world, quaternions, axes of velocities.
+"""Conventions in which right equations look different.
+
+Order, senses, zeros and units of joints, angles from the world, quaternions, axes of velocities.
 
 A convention says at which state of the model the equations are, and how the user's speeds become the model's:
-qd = S v, so that M = S' Mbar S and h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is one function in KINDS.
+qd = S v. M = S' Mbar S, h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is a function in KINDS.
 """
 
 import re
@@ -58,7 +59,7 @@ class Convention:
     def removed(
         self, M: ndarray, right: ndarray, h: ndarray, rest: ndarray
     ) -> tuple[ndarray, ndarray, ndarray]:
-        """Given Mbar, h and h at rest, which are in this convention, as the model has them. right: the model's Mbar."""
+        """Given Mbar, h and h at rest, in this convention, as the model has them. right: the model's Mbar."""
         back = np.linalg.inv(self.S)
         transposed = np.swapaxes(back, 1, 2)
         M = transposed @ M @ back
@@ -83,14 +84,9 @@ def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[nda
 
 
 def stated(
-    equations: Equations,
-    kind: str,
-    place: str,
-    was: str,
-    explains: str,
-    joints: Iterable[Joint],
+    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint],
     rank: int = 1,
-) -> Convention:
+) -> Convention:  # fmt: skip
     """A convention that can be stated by the joints."""
     joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
     cause = Cause(rank=rank, kind=kind, place=place, stated=was, explains=explains)
@@ -139,7 +135,7 @@ def orders(equations: Equations) -> Iterator[Convention]:
 
 
 def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
-    """Orders in which programs count joints: breadth first, by the alphabet, sides exchanged, reversed; two exchanged."""
+    """Orders in which programs count joints: breadth first, alphabetical, by sides, reversed; two swapped."""
     names = list(tree.joint_names)
     depth = {name: len(tree.path(i)) for i, name in enumerate(names)}
     by_depth = sorted(names, key=depth.__getitem__), sorted(names, key=lambda name: (depth[name], name))
@@ -172,7 +168,7 @@ def units(equations: Equations) -> Iterator[Convention]:
 
 
 def from_the_world(equations: Equations) -> Iterator[Convention]:
-    """Angles measured from the world instead of from the body before, of any of the hinges with parallel axes."""
+    """Angles measured from the world, not from the body before, of any of the hinges with parallel axes."""
     tree, joints = equations.tree, equations.tree.coordinates.joints
     before = {i: hinge_before(tree, i) for i, kind in enumerate(tree.kind) if kind == "hinge"}
     at_q, at_v = ([getattr(joints[i], name).start for i in before] for name in ("q", "qd"))
@@ -188,11 +184,8 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
         own[rows] = absolute[rows]
         A = np.linalg.inv(own)
         q[:, at_q] = q[:, at_q] @ A[np.ix_(at_v, at_v)].T
-        place, explains = (
-            f"angle of {listed([tree.joint_names[i] for i in chosen])}",
-            "measured from the world",
-        )
-        parent, _ = before[chosen[0]]
+        place = f"angle of {listed([tree.joint_names[i] for i in chosen])}"
+        explains, (parent, _) = "measured from the world", before[chosen[0]]
         if len(chosen) == 1 and parent in tree.body_joint:
             explains += f", not from {tree.body_names[tree.body_joint.index(parent)]}"
         was = "between a body and the one before"
@@ -202,7 +195,7 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
 
 
 def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
-    """The hinge that carries hinge i and is parallel to it, and the cosine of their axes; -1: there is none."""
+    """The hinge that carries hinge i and is parallel to it, or -1, and the cosine of their axes."""
     hinges = (k for k in tree.path(tree.parent[i]) if tree.kind[k] != "slide")
     parent = next(hinges, -1)
     if parent < 0 or tree.kind[parent] != "hinge":
@@ -222,9 +215,8 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
         order[:, joint.q] = np.roll(q[:, joint.q], 1, axis=1)
         sense[:, joint.q] = q[:, joint.q] * [1.0, -1.0, -1.0, -1.0]
         quaternions = {"": q, "read as x, y, z, w": order, "of the inverse rotation": sense}
-        for (of_q, own_q), in_world, in_body in product(
-            quaternions.items(), (False, True), (False, True)[: 1 + is_free]
-        ):
+        ways = product(quaternions.items(), (False, True), (False, True) if is_free else (False,))
+        for (of_q, own_q), in_world, in_body in ways:
             said = {f"quaternion of {name}": of_q, f"angular velocity of {name}": "in world axes" * in_world}
             said[f"linear velocity of {slides}"] = "in body axes" * in_body
             R = matrices(turn_in_parent(tree, i, list(own_q.T)), len(q))
@@ -251,9 +243,5 @@ def matrices(turn: Matrix, count: int) -> ndarray:
 
 
 KINDS: tuple[Callable[[Equations], Iterator[Convention]], ...] = (
-    senses,
-    orders,
-    units,
-    from_the_world,
-    of_balls,
-)
+    senses, orders, units, from_the_world, of_balls,
+)  # fmt: skip

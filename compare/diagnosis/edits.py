@@ -1,6 +1,6 @@
 """Numbers of a model exchanged, negated, left out or in another unit: several that one slip changes together.
 
-Each kind is one function in KINDS, which yields the place, what it explains, and the fields of the tree that differ.
+Each kind is a function in KINDS. It yields the place, what it explains, and the Tree's fields that differ.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -53,11 +53,9 @@ def edits(equations: Equations) -> list[Variant]:
 
 def in_order(order: tuple[int, ...]) -> str:
     moved = [XYZ[k] for k in range(3) if order[k] != k]
-    return (
-        f"{listed(moved)} exchanged"
-        if len(moved) == 2
-        else f"in the order {', '.join(XYZ[k] for k in order)}"
-    )
+    if len(moved) == 2:
+        return f"{listed(moved)} exchanged"
+    return f"in the order {', '.join(XYZ[k] for k in order)}"
 
 
 def ways_of_tensors() -> Ways:
@@ -102,10 +100,9 @@ def axial_for_transverse(I: ndarray) -> ndarray:
 def ways_of_vectors(name: str) -> Ways:
     """At zero, of the other sign, with two coordinates exchanged."""
     ways: Ways = {(name, "zero"): lambda r: 0.0 * r, (name, "of the other sign"): lambda r: -r}
-    for order in EXCHANGES:
-        moved = [XYZ[k] for k in range(3) if order[k] != k]
-        ways[name, f"coordinates {listed(moved)} exchanged"] = partial(np.take, indices=order)
-    return ways
+    return ways | {
+        (name, f"coordinates {in_order(order)}"): partial(np.take, indices=order) for order in EXCHANGES
+    }
 
 
 def of_rows(equations: Equations) -> Iterator[Edit]:
@@ -189,16 +186,12 @@ def swapped(equations: Equations) -> Iterator[Edit]:
     for i, j in combinations(np.flatnonzero(stated["armature"]).tolist(), 2):
         names = equations.speeds[i], equations.speeds[j]
         yield f"armatures of {listed(names)}", "exchanged", exchanged("armature", i, j)
-    for b, j in (
-        (b, j)
-        for b, i in enumerate(tree.body_joint)
-        for j, parent in enumerate(tree.parent)
-        if parent == i >= 0
-    ):
-        offset, com = stated["offset"].copy(), stated["com"].copy()
-        offset[j], com[b] = stated["com"][b], stated["offset"][j]
-        place = f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}"
-        yield place, "exchanged", {"offset": offset, "com": com}
+    for (b, i), (j, parent) in product(enumerate(tree.body_joint), enumerate(tree.parent)):
+        if parent == i >= 0:
+            offset, com = stated["offset"].copy(), stated["com"].copy()
+            offset[j], com[b] = stated["com"][b], stated["offset"][j]
+            place = f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}"
+            yield place, "exchanged", {"offset": offset, "com": com}
 
 
 def scaled(equations: Equations) -> Iterator[Edit]:
@@ -217,22 +210,25 @@ def scaled(equations: Equations) -> Iterator[Edit]:
 
 def axes(equations: Equations) -> Iterator[Edit]:
     """A hinge or slide along another axis of its frame; its other sense is a convention."""
-    for i, joint in enumerate(equations.tree.coordinates.joints):
-        name, own = equations.tree.joint_names[i], equations.axes_at(i)
-        for k, sign in ((k, sign) for k in range(3) for sign in (1.0, -1.0) if joint.kind != "ball"):
-            new = equations.stated["axis"].copy()
-            before, new[joint.qd.start] = new[joint.qd.start].copy(), sign * own[:, k]
-            if not np.allclose(new[joint.qd.start], -before):
-                yield f"axis of {name}", f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
+    joints, stated = enumerate(equations.tree.coordinates.joints), equations.stated["axis"]
+    straight = ((i, joint.qd.start) for i, joint in joints if joint.kind != "ball")
+    for (i, v), k, sign in product(straight, range(3), (1.0, -1.0)):
+        new = stated.copy()
+        new[v] = sign * equations.axes_at(i)[:, k]
+        if not np.allclose(new[v], -stated[v]):
+            place = f"axis of {equations.tree.joint_names[i]}"
+            yield place, f"{'-' if sign < 0.0 else ''}{XYZ[k]}", {"axis": new}
 
 
 def turns(equations: Equations) -> Iterator[Edit]:
-    """The fixed turn of a body in the body before (euler, rpy), or of all bodies: left out, transposed, in another order."""
+    """The fixed turn (euler, rpy) of a body, or all of them: left out, transposed, in another order."""
     tree, before = equations.tree, [equations.axes_at(parent) for parent in equations.tree.parent]
     ways: dict[str, Way] = {
-        "left out": lambda turn: turn @ turn.T, "transposed": np.transpose, "angles in the other order": in_other_order,
+        "left out": lambda turn: turn @ turn.T,
+        "transposed": np.transpose,
+        "angles in the other order": in_other_order,
         "angles in the other order, z, y, x": lambda turn: in_other_order(turn.T).T,
-    }  # fmt: skip
+    }
     fixed = [before[i].T @ equations.axes_at(i) for i in range(len(before))]
     turned = [i for i, turn in enumerate(fixed) if not np.allclose(turn, np.eye(3))]
     sets = {tree.joint_names[i]: [i] for i in turned} | ({"every joint": turned} if len(turned) > 1 else {})
@@ -256,24 +252,18 @@ def turn(tree: tmt.Tree, joint: int, fields: dict[str, ndarray], by: ndarray) ->
 
 def in_other_order(turn: ndarray) -> ndarray:
     """A turn by angles about x, y, z with the same angles about z, y, x."""
-    x, y, z = angles_of(turn)
-    return about(0, x) @ about(1, y) @ about(2, z)
+    from scipy.spatial.transform import Rotation  # slow import
+
+    return np.asarray(Rotation.from_euler("XYZ", angles_of(turn)).as_matrix())
 
 
 def angles_of(turn: ndarray) -> ndarray:
     """Roll, pitch and yaw, rad: turn = Rz(yaw) Ry(pitch) Rx(roll)."""
-    pitch = np.arctan2(-turn[2, 0], np.hypot(turn[0, 0], turn[1, 0]))
+    from scipy.spatial.transform import Rotation  # slow import
+
     if np.hypot(turn[0, 0], turn[1, 0]) < EQUAL:  # yaw and roll turn about the same axis
-        return np.array([np.arctan2(-turn[1, 2], turn[1, 1]), pitch, 0.0])
-    return np.array([np.arctan2(turn[2, 1], turn[2, 2]), pitch, np.arctan2(turn[1, 0], turn[0, 0])])
-
-
-def about(k: int, angle: float) -> ndarray:
-    """The turn by an angle about an axis."""
-    i, j = (k + 1) % 3, (k + 2) % 3
-    turn = np.eye(3)
-    turn[[i, i, j, j], [i, j, i, j]] = np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)
-    return turn
+        return np.array([np.arctan2(-turn[1, 2], turn[1, 1]), -np.pi / 2.0 * turn[2, 0], 0.0])
+    return np.asarray(Rotation.from_matrix(turn).as_euler("xyz"))
 
 
 KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (

@@ -75,7 +75,6 @@ class Search:
         self.off = self.weighted(self.right)
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
-        self.is_finished = True
 
     def within(self, entries: ndarray) -> "Search":
         """The search of what explains some entries (entries,), whatever the others are."""
@@ -98,7 +97,7 @@ class Search:
     def left_over(self, left: ndarray) -> tuple[float, float]:
         """What is left, in tolerances: the largest, and the share of the difference.
 
-        The largest counts as 1 where the share is rounding: a length in mm rounds what is small in the right one.
+        The largest is at most 1 where the share is rounding: a length in mm rounds what is small.
         """
         share = float(np.linalg.norm(left)) / self.size
         ratio = float(np.nan_to_num(np.abs(left).max(), nan=np.inf))
@@ -214,7 +213,7 @@ class Search:
         return float(np.abs(off - x * first - x * x * second).max()), x * self.places[k].size
 
     def pairs(self, kinds: Sequence[str], others: Sequence[str]) -> list[Fitted]:
-        """Two places together, one of some kinds and one of some others; the most promising pairs are fitted."""
+        """Two places together, one of some kinds and one of others; the most promising pairs are fitted."""
         columns = np.concatenate([part.reshape(len(self.places), -1) for part in self.expansion])
         lengths = np.linalg.norm(columns, axis=1)
         columns = columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]
@@ -233,7 +232,7 @@ class Search:
 
 
 def nearest_change(a: ndarray, b: ndarray, off: ndarray) -> tuple[float, float]:
-    """What the best change x of a place leaves, |off - x a - x^2 b|, and x, a root of a cubic. All (states, entries)."""
+    """What the best change x leaves, |off - x a - x^2 b|, and x, a root of a cubic; of (states, entries)."""
     aa, ab, bb = (a * a).sum(), (a * b).sum(), (b * b).sum()
     cubic = [2.0 * bb, 3.0 * ab, aa - 2.0 * (off * b).sum(), -(off * a).sum()]
     roots = np.roots(cubic) if np.isfinite(cubic).all() else np.zeros(0)

@@ -1,4 +1,4 @@
-"""Given values of Mbar and h in a layout that has their parts, with the tolerances of their own scale."""
+"""Given values of Mbar and h with their parts, and tolerances of their own scale; where they differ."""
 
 from collections.abc import Callable
 
@@ -7,9 +7,12 @@ from numpy import ndarray
 
 from tmt import Tree
 
+from .cause import Detail
 from .conventions import Convention
-from .model import ROUNDED, Equations, Layout, Values
+from .model import MOST_SPEEDS, ROUNDED, Entry, Equations, Layout, Values, coefficients_of
 
+SUMMED = 8.0  # times the tolerance of an entry: of a sum of its values at several speeds
+MOST_POSITIONS = 6  # in a sentence
 Bias = Callable[[ndarray], ndarray]  # speeds (states, nv) -> h (states, nv) at the positions of the states
 
 
@@ -17,8 +20,9 @@ class Given:
     """Values of Mbar and h, in a layout that has their parts, beside the right ones at the same states."""
 
     def __init__(
-        self, tree: Tree, values: Values, bias: Bias | None, mass_matrix: Callable[[ndarray], ndarray] | None = None,
-        rest: ndarray | None = None, qdd: ndarray | None = None,
+        self, tree: Tree, values: Values, bias: Bias | None,
+        mass_matrix: Callable[[ndarray], ndarray] | None = None, rest: ndarray | None = None,
+        qdd: ndarray | None = None,
     ):  # fmt: skip
         self.tree, self.values, self.bias, self.mass_matrix = tree, values, bias, mass_matrix
         M, h, nv = values.mass_matrix, values.bias, len(tree.axis)
@@ -40,7 +44,7 @@ class Given:
 
     @property
     def own_scale(self) -> ndarray:
-        """The size of each entry at a state, by its largest value at all states: large values are rounded too."""
+        """The size of each entry at a state, by its largest value at all: large values are rounded too."""
         speed = 1.0 + np.abs(self.values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
         of_state, start = np.ones_like(self.packed), self.layout.in_h.start
         of_state[:, start : start + self.layout.nv] = speed
@@ -58,3 +62,30 @@ class Given:
         M, h, rest = convention.removed(M, Equations(self.tree, q, qd).parts[0], h, rest)
         values = Values.of(self.tree, q, qd, M, h)
         return Given(self.tree, values, None, None, None if self.rest is None else rest)
+
+    def details(self) -> tuple[Detail, ...]:
+        """Entries of Mbar, gravity and coefficients of h that differ, where they are furthest apart."""
+        equations, details = self.equations, []
+        right, of_M = equations.coefficients, equations.entries[equations.in_M]
+        tolerances = dict.fromkeys(right, SUMMED * self.tolerance[:, equations.in_h].max(axis=1))
+        tolerances |= dict(zip(of_M, self.tolerance.T))
+        for entry, yours in (dict(zip(of_M, self.packed.T)) | self.coefficients_of_h).items():
+            off = np.abs(yours - right[entry])
+            if np.isfinite(yours).all() and (off > tolerances[entry]).any():
+                k = int(np.argmax(off))
+                positions = zip(equations.coordinates.positions[:MOST_POSITIONS], equations.q[k])
+                at = tuple(f"{name} = {value:.6g}" for name, value in positions)
+                numbers = (x if abs(x) > tolerances[entry][k] else 0.0 for x in (yours[k], right[entry][k]))
+                your_number, right_number = numbers
+                details.append(Detail(entry.named(equations.speeds), your_number, right_number, at))
+        return tuple(details)
+
+    @property
+    def coefficients_of_h(self) -> dict[Entry, ndarray]:
+        """The given coefficients of h, (states,) each, as far as they are known."""
+        bias, nv, qd = self.bias, self.equations.nv, self.values.qd
+        if not qd.any():
+            return {Entry("gravity", (i,)): column for i, column in enumerate(self.values.bias.T)}
+        if bias is None or nv > MOST_SPEEDS:
+            return {}
+        return coefficients_of(lambda speeds: np.stack([bias(speed + 0.0 * qd) for speed in speeds]), nv)

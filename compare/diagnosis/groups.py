@@ -1,6 +1,7 @@
 """Several inertial numbers at once, in which Mbar and h are linear: one regression for each group of them."""
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from numpy import ndarray
@@ -21,7 +22,7 @@ OF_BODY = 10  # mass, its product with the CoM, tensor about the origin of the f
 
 
 def body_columns(equations: Equations) -> ndarray:
-    """What a unit of each of the ten numbers of each body adds to the values, (bodies, 10, states, entries)."""
+    """What a unit of each body's ten numbers adds to the values, (bodies, 10, states, entries)."""
     changes: dict[Path, ndarray] = {}
     stated, shape = equations.stated, (len(equations.tree.mass), 1 + OF_BODY)
     for b, k in np.ndindex(shape):  # the last is the base: the mass is larger by 1, and the others stay
@@ -82,16 +83,16 @@ def loads(equations: Equations, search: Search) -> Iterator[Cause]:
         com = frame.axes.T @ (com - frame.origin)
         where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(com) < ZERO, 0.0, com))
         explains, is_known = f"{mass:.5g} kg, CoM ({where}) m", determined[4:].all()
-        of_tensor = {name: tensor[i, j] for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass}
-        if is_known and of_tensor:
-            explains += "".join(f", {name} {x:.4g}" for name, x in of_tensor.items()) + " kg m2"
+        shown = [f", {name} {tensor[i, j]:.4g}" for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass]
+        if is_known and shown:
+            explains += "".join(shown) + " kg m2"
         is_possible = not is_known or np.linalg.eigvalsh(tensor)[0] >= -ZERO * mass
         if is_possible and all(map(is_round, (mass, *com))):
             yield Cause(rank=3, kind="load", place=f"a load on {body}", stated="", explains=explains)
 
 
 def turned(equations: Equations, search: Search) -> Iterator[Cause]:
-    """The tensor of a body about other axes, with the same principal moments: the turn of an inertial frame."""
+    """The tensor of a body about other axes, with the same principal moments: an inertial frame turned."""
     for b, columns in enumerate(body_columns(equations)[:, -6:]):
         added, determined = fit(search, columns)
         axes, stated = equations.frame_of(b).axes, equations.stated["inertia"][b]
@@ -105,12 +106,8 @@ def turned(equations: Equations, search: Search) -> Iterator[Cause]:
             continue
         signs = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
         near = sorted(((after * sign) @ before.T for sign in signs), key=np.trace, reverse=True)
-        ways = [
-            (how, *of_angles(turn if how == "turned" else turn.T))
-            for turn in near
-            for how in ("turned", "turned back")
-        ]
-        for how, angles, unit in ways:
+        for turn, how in product(near, ("turned", "turned back")):
+            angles, unit = of_angles(turn if how == "turned" else turn.T)
             if all(map(is_round, angles)):
                 explains = f"{how} by rpy = ({', '.join(f'{angle:.5g}' for angle in angles)}) {unit}"
                 place = f"inertia of {equations.tree.body_names[b]}"
@@ -145,26 +142,20 @@ def several(search: Search) -> Iterator[Cause]:
         if field not in ("armature", "mass", "inertia") or len(chosen) < 2:
             continue
         places = [search.places[k] for k in chosen]
-        changes = [x * place.size for x, place in zip(fit(search, columns[chosen])[0], places)]
-        pairs = [(place, place.value(change)) for place, change in zip(places, changes)]
-        pairs = [
-            (place, x) for place, x in pairs if abs(x - place.stated) > SMALL * max(abs(x), abs(place.stated))
-        ]
+        fitted = zip(places, fit(search, columns[chosen])[0])
+        pairs = [(place, place.value(x * place.size)) for place, x in fitted]
+        pairs = [(place, x) for place, x in pairs if not np.isclose(x, place.stated, rtol=SMALL, atol=0.0)]
         if len(pairs) < 2 or not all(x >= place.least and is_round(x) for place, x in pairs):
             continue
-        stated, explains = (
-            ", ".join(f"{x:.6g}" for x in those)
-            for those in ([place.stated for place, _ in pairs], [x for _, x in pairs])
-        )
+        stated = ", ".join(f"{place.stated:.6g}" for place, _ in pairs)
+        explains = ", ".join(f"{x:.6g}" for _, x in pairs)
         names = [place.name.removeprefix(field).partition(" of ") for place, _ in pairs]
-        components = [before.strip() for before, *_ in names if before]
-        called = (
-            f"{field} {listed(components)}".strip()
-            + f" of {listed(list(dict.fromkeys(owner for *_, owner in names)))}"
+        components = listed([before.strip() for before, *_ in names if before])
+        where = (
+            f"{field} {components}".strip() + f" of {listed(list(dict.fromkeys(name for *_, name in names)))}"
         )
-        yield Cause(
-            rank=3, kind="several", place=called, stated=stated, explains=explains, unit=pairs[0][0].unit
-        )
+        unit = places[0].unit
+        yield Cause(rank=3, kind="several", place=where, stated=stated, explains=explains, unit=unit)
 
 
 def is_round(x: float) -> bool:

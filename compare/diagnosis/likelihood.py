@@ -10,9 +10,9 @@ from .places import OF_ZERO, is_common
 
 NATURAL = 1.0  # a cause that costs less is said; the others only if there is no such
 OF_KINDS = {  # what a cause of a kind costs, besides its numbers
-    "option": 0.0, "sign": 0.0, "angles": 0.0, "number": 0.0, OF_ZERO: 0.05, "unit": 0.1, "body": 0.12, "axes": 0.15,
-    "term": 0.15, "part": 0.16, "force": 0.2, "numbers": 0.2, "order": 0.25, "slip": 0.3, "coefficient": 0.3,
-    "added": 0.3,    "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.5,
+    "option": 0.0, "sign": 0.0, "angles": 0.0, "number": 0.0, OF_ZERO: 0.05, "unit": 0.1, "body": 0.12,
+    "axes": 0.15, "term": 0.15, "part": 0.16, "force": 0.2, "numbers": 0.2, "order": 0.25, "slip": 0.3,
+    "coefficient": 0.3, "added": 0.3, "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.5,
 }  # fmt: skip
 OF_NAME, ADDED, PAIR = 0.1, 0.1, 0.3  # for each joint that is named; a number that was 0; a second cause
 IN_PART, CONVENTION_IN_PART = 0.12, 0.2  # of a slip in some parts alone; of a convention more

@@ -24,11 +24,14 @@ from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
-OF_TERM = {  # of each body: T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' I w_conv and B' (omega x I omega) of h
-    "translation": "translational inertia of {}", "rotation": "rotational inertia of {}", "gravity": "gravity of {}",
-    "convective": "centripetal and Coriolis forces of {}", "Euler": "moment I w_conv of {}",
+OF_TERM = {  # T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' I w_conv and B' (omega x I omega) of h
+    "translation": "translational inertia of {}",
+    "rotation": "rotational inertia of {}",
+    "gravity": "gravity of {}",
+    "convective": "centripetal and Coriolis forces of {}",
+    "Euler": "moment I w_conv of {}",
     "gyroscopic": "gyroscopic moment omega x I omega of {}",
-}  # fmt: skip
+}
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 WHOLE = 1e-12  # of components of axes from whole numbers
 TINY = 1e-100  # an imaginary change, whose square vanishes
@@ -43,7 +46,7 @@ class Path(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """A body's frame in the file, in which its numbers are said; the Tree's frames are parallel to the world at zero."""
+    """A body's frame in the file, which has its numbers; a Tree's is parallel to the world at zero."""
 
     origin: ndarray  # in the frame of the joint
     axes: ndarray  # as columns
@@ -71,7 +74,7 @@ Changes = Mapping[Path, ndarray]  # what is added to a number, (changes,)
 
 
 class Layout(NamedTuple):
-    """Which numbers of Mbar and h stand in a row of values: those of Mbar, then h, or its velocity terms and h at rest.
+    """What stands in a row of values: Mbar by rows, then h, or its velocity terms and h at rest.
 
     With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone.
     """
@@ -122,7 +125,7 @@ class Layout(NamedTuple):
 
 
 class Equations:
-    """Mbar and h of a tree at states q (states, nq), qd (states, nv); a row of numbers for each state, see Layout."""
+    """Mbar and h of a tree at states q (states, nq), qd (states, nv); a row of a Layout for each state."""
 
     def __init__(self, tree: tmt.Tree, q: ndarray, qd: ndarray, layout: Layout | None = None):
         self.tree, self.q, self.qd = tree, q, qd
@@ -131,6 +134,7 @@ class Equations:
         self.in_M, self.in_h = self.layout.in_M, self.layout.in_h
         self.coordinates = Coordinates(tree.joint_names, tree.kind)
         self.speeds = self.coordinates.speeds
+        self.joints = dict(zip(tree.joint_names, tree.coordinates.joints))
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
 
     @cached_property
@@ -150,7 +154,7 @@ class Equations:
         return Frame(np.array(site.offset), whole(np.array(site.turn, float)))
 
     def axes_at(self, joint: int) -> ndarray:
-        """The axes of the file's body that a joint moves, as columns; of a joint without one, of that which it carries."""
+        """The axes of the file's body that a joint moves, as columns; else of the body that it carries."""
         of_joints = dict(zip(self.tree.site_joint[::-1], self.tree.site_turn[::-1]))
         carried = (
             k for k in range(joint, len(self.tree.parent)) if k in of_joints and joint in self.tree.path(k)

@@ -5,7 +5,7 @@ entries of Mbar or h. The zero of a joint is a convention and has rank 1; the ot
 """
 
 from collections.abc import Iterable, Iterator
-from itertools import chain
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ WRITTEN = 1e-6  # of a turn: what the digits of an angle leave
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 SMALL = 1e-9  # of the other numbers: a number that a regression leaves at 0
 ALL = slice(None)  # entries of a state
+ONE = np.array(1.0)
 Entries = slice | list[int]
 OF_FORCES = ("N m s/rad", "N m/rad", "N m")  # units of damping, stiffness and a force
 OF_SLIDES = {"N m s/rad": "N s/m", "N m/rad": "N/m", "N m": "N", "kg m2": "kg", "rad": "m"}  # units
@@ -96,13 +97,11 @@ def is_common(factor: float) -> bool:
 
 
 def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
-    """Damping, stiffness, rest of the spring, friction and a constant force of each joint, and damping of all together."""
+    """Damping, spring, friction and a constant force of each joint, and damping of all together."""
     names = Coordinates(tree.joint_names, tree.kind).speeds
 
-    def place(
-        name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0, size: float = 1.0
-    ) -> Place:
-        return Place("number", name, stated, unit, size, column=force, least=least)
+    def place(name: str, unit: str, stated: float, force: np.ndarray, least: float = 0.0) -> Place:
+        return Place("number", name, stated, unit, 1.0, column=force, least=least)
 
     for i, joint in enumerate(tree.coordinates.joints):
         of_damping, of_stiffness, of_force = (unit_of(unit, joint.kind) for unit in OF_FORCES)
@@ -131,15 +130,11 @@ def numbers(equations: Equations) -> Iterator[Place]:
     length = max(1e-3, float(np.abs(stated["offset"]).max()), float(np.abs(stated["com"]).max()))
     heaviest = stated["mass"].max()
 
-    def number(name: str, unit: str, size: float, path: Path, least: float = -np.inf) -> Place:
-        now = float(stated[path.field][path.at])
-        return Place("number", name, now, unit, float(size), ((path, 1.0),), least=least)
-
-    def component(
-        name: str, unit: str, size: float, path: Path, along: np.ndarray, origin: np.ndarray | float = 0.0,
-        least: float = -np.inf,
+    def number(
+        name: str, unit: str, size: float, path: Path, along: np.ndarray = ONE,
+        origin: np.ndarray | float = 0.0, least: float = -np.inf,
     ) -> Place:  # fmt: skip
-        """The component of a vector or tensor along an axis, or the product of two, of the file's frame."""
+        """A number, or a component of a vector or tensor along an axis, or the product of two, of a frame."""
         now = float((along * (stated[path.field][path.at] - origin)).sum() / (along * along).sum())
         moves = [(Path(path.field, (*path.at, *at)), float(x)) for at, x in np.ndenumerate(along) if x]
         now = 0.0 if abs(now) < WHOLE * size else now
@@ -147,7 +142,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
 
     def triple(name: str, unit: str, size: float, path: Path, frame: Frame) -> list[Place]:
         axes = zip(XYZ, frame.axes.T)
-        return [component(name.format(axis), unit, size, path, along, frame.origin) for axis, along in axes]
+        return [number(name.format(axis), unit, size, path, along, frame.origin) for axis, along in axes]
 
     for b, body in enumerate(tree.body_names):
         heavy = stated["mass"][b] or heaviest
@@ -159,19 +154,16 @@ def numbers(equations: Equations) -> Iterator[Place]:
             along = np.outer(frame.axes[:, i], frame.axes[:, j])
             along, least = (along, 0.0) if i == j else (along + along.T, -np.inf)
             called = f"inertia {name} of {body}"
-            yield component(called, "kg m2", size, Path("inertia", (b,)), along, least=least)
-    for i, (name, joint) in enumerate(zip(tree.joint_names, tree.coordinates.joints)):
+            yield number(called, "kg m2", size, Path("inertia", (b,)), along, least=least)
+    for i, (name, joint) in enumerate(equations.joints.items()):
         carried = [("com", b) for b, of_joint in enumerate(tree.body_joint) if of_joint == i]
         carried += [("offset", j) for j, parent in enumerate(tree.parent) if parent == i]
         of_parent = Frame(np.zeros(3), equations.axes_at(tree.parent[i]))
         for place in triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent):
             yield place
             if joint.kind != "slide":
-                stays = [
-                    (Path(field, (index, path.at[1])), -x)
-                    for field, index in carried
-                    for path, x in place.moves
-                ]
+                pairs = product(carried, place.moves)
+                stays = [(Path(field, (index, path.at[1])), -x) for (field, index), (path, x) in pairs]
                 anchor = place.name.replace("offset", "anchor", 1)
                 yield place._replace(name=anchor, moves=(*place.moves, *stays))
         if joint.kind != "ball":
@@ -188,7 +180,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
 
 
 def tied(equations: Equations) -> Iterator[Place]:
-    """The same number of bodies or joints that are alike, such as a left and a right one, changed together."""
+    """The same number of bodies or joints that are alike, as a left and a right one, changed together."""
     every = [place for place in numbers(equations) if place.kind == "number" and place.is_quadratic]
     for names in alike(equations.tree):
         of_each = [[place for place in every if place.name.endswith(f" of {name}")] for name in names]

@@ -1,7 +1,7 @@
-"""Mbar and h by the recursion of Newton and Euler with one slip: motion outward, forces inward, as by tmt.derivation.
+"""Mbar and h by the recursion of Newton and Euler with one slip: motion outward, forces inward.
 
-Each slip is one record in SLIPS: the step that it changes, its name, and whether it is made at joints or bodies.
-The step has its wrong values where `Recursion.step` is called with its name. Arrays are (rows, 3) in the world's axes.
+A slip is a record in SLIPS: the step that it changes, its name, where it is made. A step's wrong values are
+where `Recursion.step` is called with its name. Arrays are (rows, 3), in the world's axes.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -48,7 +48,8 @@ SLIPS = (
     Slip("coriolis", "Coriolis acceleration 2 omega x axis qd of {} left out"),
     Slip("base", "acceleration of the joint before {} left out"),
     Slip("base of body", "acceleration of the joint left out in that of the CoM of {}", "body"),
-    Slip("centripetal of offset", "centripetal acceleration omega x (omega x o) of the offset of {} left out"),
+    Slip("centripetal of offset",
+         "centripetal acceleration omega x (omega x o) of the offset of {} left out"),
     Slip("centripetal", "centripetal acceleration omega x (omega x c) of the CoM of {} left out", "body"),
     Slip("offset outward", "acceleration alpha x o of the offset of {} left out"),
     Slip("CoM outward", "acceleration alpha x c of the CoM of {} left out", "body"),
@@ -58,21 +59,26 @@ SLIPS = (
     Slip("world axes", "inertia of {} in world axes, R I R', for one in its own axes", "body"),
     Slip("about the joint", "inertia of {} about its joint and mass counted again", "body"),
     Slip("parallel axis", "parallel-axis term m (c'c 1 - c c') of {} left out", "body"),
-    Slip("relative B", "angular velocity of {} relative to the body before, not to the world, in its rotation", "body"),
+    Slip("relative B",
+         "angular velocity of {} relative to the body before, not to the world, in its rotation", "body"),
     Slip("column of B", "speed of {} left out of the angular velocity", "joint and body"),
     Slip("CoM inward", "moment c x F of the force at the CoM of {} left out", "body"),
     Slip("sign inward", "moment c x F of the force at the CoM of {} with the other sign", "body"),
     Slip("offset inward", "moment of the force passed on by {} left out"),
-    Slip("CoM for offset inward", "lever of the force passed on by {}: the CoM of the body before instead of the offset"),
+    Slip("CoM for offset inward",
+         "lever of the force passed on by {}: the CoM of the body before instead of the offset"),
     Slip("force turned back", "force passed on by {} turned with R' for R"),
     Slip("force not turned", f"force passed on by {{}} not turned {AXES}"),
     Slip("moment turned back", "moment passed on by {} turned with R' for R"),
     Slip("moment not turned", f"moment passed on by {{}} not turned {AXES}"),
-    *(Slip(f"sines of components {two}", f"sine and cosine exchanged in the position of the CoM of {{}} ({two})", "body")
+    *(Slip(f"sines of components {two}",
+           f"sine and cosine exchanged in the position of the CoM of {{}} ({two})", "body")
       for two in ("xy", "xz", "yz")),
-    *(Slip(f"angle of components {k}", f"angle from the joint before for that from the world in {k} of the CoM of {{}}", "body")
+    *(Slip(f"angle of components {k}",
+           f"angle from the joint before for that from the world in {k} of the CoM of {{}}", "body")
       for k in "xyz"),
-    *(Slip(f"signs of components {k}", f"sign of {k} of the CoM of {{}} from its joint", "body") for k in "xyz"),
+    *(Slip(f"signs of components {k}", f"sign of {k} of the CoM of {{}} from its joint", "body")
+      for k in "xyz"),
 )  # fmt: skip
 
 
@@ -120,7 +126,7 @@ class Recursion:
             self.frames.append(self.frame(i))
 
     def step(self, name: str, index: int, right: ndarray, wrong: Wrong | None = None) -> ndarray:
-        """A step's values: wrong ones, by default zero, in the rows in which this slip is made at a joint or body."""
+        """A step's values: wrong ones, by default zero, in the rows with this slip at a joint or body."""
         if name != self.slip or self.at is None or not self.at[index].any():
             return right
         where = self.at[index].reshape(-1, *[1] * (right.ndim - 1))
@@ -153,9 +159,8 @@ class Recursion:
         axes = [step("axis", i, rotated(carrier, axis), axis.copy) for axis in local]
         spin = np.einsum("ksc,sk->sc", axes, rates)
         to_parent = backward(parent.turn)
-        passed = step(
-            "carried back", i, parent.passed, lambda: rotated(turn @ own @ to_parent, parent.passed)
-        )
+        passed = parent.passed
+        passed = step("carried back", i, passed, lambda: rotated(turn @ own @ to_parent, parent.passed))
         passed = step("carried as it is", i, passed, lambda: rotated(turn @ to_parent, passed))
         alpha = parent.alpha + step("alpha", i, np.cross(passed, spin))
         used = step("relative", i, passed + spin, lambda: spin)
@@ -172,7 +177,7 @@ class Recursion:
         return self.step("turned back", b, turned, lambda: backward(turn) @ I @ turn)
 
     def segment(self, b: int, right: ndarray, alone: ndarray) -> ndarray:
-        """What the segment from the joint of a body to its CoM adds to a velocity or acceleration, as differentiated.
+        """What the segment from a body's joint to its CoM adds to a velocity or acceleration.
 
         alone: as if the joint's own turn were all.
         """
@@ -212,7 +217,7 @@ class Recursion:
         return self.step("base of body", b, frame.a + a, lambda: a)
 
     def columns(self, b: int) -> tuple[ndarray, ndarray, ndarray, ndarray]:
-        """T and B of a body, and the columns by which its force and moment act on the joints, (rows, nv, 3) each."""
+        """T and B of a body, and the columns by which its force and moment act, (rows, nv, 3) each."""
         tree, joint, step = self.tree, self.tree.body_joint[b], self.step
         T, B, levers, turns = np.zeros((4, self.rows, len(tree.axis), 3))
         frame, com = self.frames[joint], self.everywhere(tree.com[b])
@@ -249,7 +254,7 @@ class Recursion:
         return self.step("lever from the joint before", i, lever, lambda: x - self.before(i).origin)
 
     def wrenches(self, b: int, r: ndarray) -> Iterator[tuple[int, ndarray, ndarray]]:
-        """The joints that move a body, inward, and how a force at its CoM and a moment are moments there, (rows, 3, 3)."""
+        """The joints that move a body, inward; its force and moment as moments there, (rows, 3, 3)."""
         step, joint, force, of_moment = self.step, self.tree.body_joint[b], self.identity, self.identity
         arm = step("CoM outward", b, step("CoM inward", b, r))
         of_force = crossing(step("sign inward", b, arm, lambda: -r))

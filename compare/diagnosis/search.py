@@ -1,4 +1,4 @@
-"""The search for causes of given values of Mbar and h: everything alone, in parts, with a convention, in pairs."""
+"""The search for causes of given values of Mbar and h: alone, in parts, with a convention, in pairs."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -14,7 +14,6 @@ from tmt import Tree
 
 from ..core.cause import Cause
 from .cause import LEAST_STATES, Diagnosis, ranked, together
-from .coefficients import Compared
 from .consistency import follows_from
 from .conventions import Convention, all_conventions, values_in
 from .edits import edits
@@ -94,7 +93,7 @@ class Explanations:
         closest = min(near, key=lambda fit: fit.left_over, default=None)
         return found._replace(
             closest=closest.cause if closest else None,
-            details=Compared(self.given).details() if layout.qdd is None else (),
+            details=self.given.details() if layout.qdd is None else (),
             seconds=None if self.is_finished else self.seconds,
         )
 
@@ -104,15 +103,12 @@ class Explanations:
     # stages
 
     def stages(self) -> Iterator[list[Cause]]:
-        """Explanations of everything: of each stage those that are natural, if there are any; then the others.
+        """Explanations of everything: the natural ones of each stage, if there are any; then the others.
 
         One number with many digits is simpler than two causes.
         """
         unusual: list[Cause] = []
-        stages = (
-            self.everything, self.derivations, self.of_parts, self.other_angles, self.groups, self.two_causes,
-        )  # fmt: skip
-        for stage in stages:
+        for stage in (self.everything, self.slips, self.of_parts, self.angles, self.groups, self.two_causes):
             causes: list[Cause] = []
             try:
                 causes += stage()  # what was found before the end is kept
@@ -135,36 +131,39 @@ class Explanations:
         yield from self.statements.causes(fit for fit in self.all_singles if fit.explains)
         yield from self.search.explained(self.variants)
 
-    def derivations(self) -> Iterator[Cause]:
+    def slips(self) -> list[Cause]:
         """Slips of a recursion."""
-        yield from self.search.explained(self.recursions)
+        return self.search.explained(self.recursions)
+
+    def angles(self) -> list[Cause]:
+        """Sines and cosines of a hinge, in an entry or a part."""
+        return self.search.explained(other_angles(self.equations, self.search))
 
     def groups(self) -> Iterator[Cause]:
         """Loads, and tensors about other axes."""
         yield from loads(self.equations, self.search)
         yield from turned(self.equations, self.search)
 
-    def of_parts(self) -> Iterator[Cause]:
+    def of_parts(self) -> list[Cause]:
         """Slips in some parts alone, in all that differ."""
-        different, known, causes = self.differing, self.known, []
-        if {"velocity terms", "M"} <= set(different) and self.h_follows_from_M:
-            different, known = (
-                [name for name in names if name != "velocity terms"] for names in (different, known)
-            )
-            causes += self.within(known, self.known)
+        different, known = self.independent(self.differing), self.independent(self.known)
+        causes = self.within(known, self.known) if known != self.known else []
         if different != self.known:
             causes += self.within(different, self.differing)
-        yield from causes
+        return causes
 
     def of_each_part(self) -> Iterator[Cause]:
         """One cause for some parts, and one for the others."""
-        different = self.differing
-        if {"velocity terms", "M"} <= set(different) and self.h_follows_from_M:
-            different = [name for name in different if name != "velocity terms"]
+        different = self.independent(self.differing)
         for part in different if len(different) > 2 else different[:-1]:
             one, others = self.within([part], [part]), [name for name in different if name != part]
             if one and (two := self.within(others, others)):
                 yield together([one[0], two[0]], 0.0)
+
+    def independent(self, parts: Sequence[str]) -> list[str]:
+        """The parts without velocity terms that follow from a given Mbar that differs."""
+        is_left_out = {"velocity terms", "M"} <= set(self.differing) and self.h_follows_from_M
+        return [name for name in parts if not (is_left_out and name == "velocity terms")]
 
     def entries_in(self, parts: Iterable[str]) -> ndarray:
         entries = np.zeros(self.search.right.shape[1], bool)
@@ -173,31 +172,29 @@ class Explanations:
         return entries
 
     def within(self, parts: Sequence[str], said: Sequence[str]) -> list[Cause]:
-        """Natural explanations of some parts, whatever the others are, the likeliest first; said: the parts that are meant."""
-        search, others = (
-            self.search.within(self.entries_in(parts)),
-            self.entries_in(set(self.known) - set(said)),
-        )
+        """Natural explanations of some parts, whatever the others are, the likeliest first.
+
+        said: the parts that are meant.
+        """
+        search = self.search.within(self.entries_in(parts))
+        others = self.entries_in(set(self.known) - set(said))
         if not (np.abs(search.off) > 1.0).any():
             return []
         causes: list[Cause] = []
 
         def add(found: list[Cause], moved: ndarray) -> None:
             is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
-            causes.extend(in_part(cause, said) if is_elsewhere else cause for cause in found)
+            where = IN_PARTS.get(tuple(said), "") if is_elsewhere else ""
+            causes.extend(replace(cause, place=cause.place + where) for cause in found)
 
         angles = other_angles(self.equations, search)
-        for variant in chain(self.options, self.variants, self.recursions, angles):
+        for variant in chain(self.all_variants, angles):
             add(search.explained([variant]), variant[1] - search.right)
         for convention, values in self.in_conventions(search):
             add(search.explained([(convention.cause, values)]), values - search.right)
         for fit in (fit for fit in search.singles(is_thorough=False) if fit.explains):
             add(self.statements.causes([fit]), search.change(fit))
         return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
-
-    def other_angles(self) -> Iterator[Cause]:
-        """Sines and cosines of a hinge, in an entry or a part."""
-        yield from self.search.explained(other_angles(self.equations, self.search))
 
     def beside_conventions(self) -> Iterator[Cause]:
         """A convention and one more cause, in the model's own joints."""
@@ -220,8 +217,8 @@ class Explanations:
         yield from self.with_slips()
 
     def with_slips(self) -> Iterator[Cause]:
-        """An edit or a slip beside a number, a term or another slip, whose changes of the values are added."""
-        variants, search = [*self.options, *self.variants, *self.recursions], self.search
+        """An edit or a slip beside a number, a term or another slip; their changes are added."""
+        variants, search = self.all_variants, self.search
         moved = np.stack([((values - search.right) * search.weight).ravel() for _, values in variants])
         left = search.off.ravel() - moved
         squares, enough = np.einsum("vm,vm->v", left, left), (PROMISING * search.size) ** 2
@@ -255,6 +252,10 @@ class Explanations:
     def recursions(self) -> list[Variant]:
         return list(slips_of_recursion(self.equations))
 
+    @property
+    def all_variants(self) -> list[Variant]:
+        return [*self.options, *self.variants, *self.recursions]
+
     @cached_property
     def all_singles(self) -> list[Fitted]:
         try:
@@ -272,10 +273,8 @@ class Explanations:
     def shares(self, search: Search) -> list[tuple[float, Convention]]:
         """What each convention leaves at a few states, a share, and the convention."""
         size = float(np.linalg.norm(search.off[:FEW])) or 1.0
-        left = (
-            (np.linalg.norm(search.weighted(values)), convention) for convention, values in self.conventions
-        )
-        return [(float(share) / size, convention) for share, convention in left]
+        left = [float(np.linalg.norm(search.weighted(values))) for _, values in self.conventions]
+        return [(norm / size, convention) for norm, (convention, _) in zip(left, self.conventions)]
 
     def in_conventions(self, search: Search) -> Iterator[tuple[Convention, ndarray]]:
         """The conventions that leave nothing at a few states, with the values at all."""
@@ -285,10 +284,8 @@ class Explanations:
     @property
     def near_conventions(self) -> list[Convention]:
         """The conventions that leave least, if they leave something."""
-        best = sorted(
-            (pair for pair in self.shares(self.search) if pair[0] < PARTIAL), key=lambda pair: pair[0]
-        )
-        return [convention for _, convention in best[:NEAR]]
+        best = sorted(self.shares(self.search), key=lambda pair: pair[0])[:NEAR]
+        return [convention for share, convention in best if share < PARTIAL]
 
     @property
     def h_follows_from_M(self) -> bool:
@@ -297,11 +294,6 @@ class Explanations:
         if given.mass_matrix is None or given.rest is None or self.equations.coordinates.has_balls:
             return False
         return follows_from(given.mass_matrix, values.q, values.qd, values.bias - given.rest)
-
-
-def in_part(cause: Cause, parts: Sequence[str]) -> Cause:
-    """A cause that is meant in some parts alone."""
-    return replace(cause, place=cause.place + IN_PARTS.get(tuple(parts), ""))
 
 
 def distinct(causes: Iterable[Cause]) -> list[Cause]:

@@ -19,7 +19,7 @@ class Stated(NamedTuple):
 
 
 class Statements(NamedTuple):
-    """The statements of causes. stated: as the joints are stated, which may be wrong; None: they cannot be."""
+    """The statements of causes. stated: the joints as stated, which may be wrong; None: they cannot be."""
 
     coordinates: Coordinates
     stated: Stated | None

@@ -1,4 +1,4 @@
-"""The places that are a factor: of terms and their parts, of entries and coefficients; and all places of a search."""
+"""Places that are a factor: of terms and their parts, of entries and coefficients; all places of a search."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, combinations_with_replacement
@@ -29,7 +29,7 @@ def all_places(equations: Equations) -> list[Place]:
 
 
 def unit_columns(equations: Equations) -> dict[str, np.ndarray]:
-    """The values of 1 in an entry of Mbar, in a row of h at rest, and as a coefficient of speeds in h, by names."""
+    """The values of 1 in an entry of Mbar, a row of h at rest, a coefficient of speeds in h, by names."""
     layout, (M, velocity_terms, rest), columns = equations.layout, equations.parts, {}
     for entry in equations.coefficients if equations.nv <= MOST_SPEEDS else ():
         parts = {"M": 0.0 * M, "velocity": 0.0 * velocity_terms, "gravity": 0.0 * rest}
@@ -114,7 +114,7 @@ def masses_in_rows(equations: Equations) -> Iterator[Place]:
 
 
 def terms(equations: Equations) -> Iterator[Place]:
-    """The factor of every term of each body and of several together, in all, in an entry of Mbar and in a row of h."""
+    """Factors of terms of each body, and of several together: in all, in an entry of Mbar, a row of h."""
     bodies, is_small = sets_of_bodies(equations.tree), equations.nv <= MOST_SPEEDS
     of_rows = {name: in_rows(equations, rows) for name, rows in rows_of_h(equations).items()}
     for name, together in ({name: (term,) for term, name in OF_TERM.items()} | TOGETHER).items():
@@ -161,7 +161,7 @@ def lengths_of(tree: tmt.Tree, b: int) -> dict[str, list[tuple[str, int]]]:
 
 
 def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
-    """What each pair of lengths of a body adds to Mbar and h, (states, entries); beside a slide, its gravity too."""
+    """What pairs of lengths of a body add to Mbar and h, (states, entries); for a slide, its gravity too."""
     tree, parts = equations.tree, {}
     present: dict[tuple[int, str, str], list[tuple[str, int]]] = {}
     slides: set[str] = set()
@@ -198,7 +198,7 @@ def alone(equations: Equations, sets: list[list[tuple[str, int]]]) -> np.ndarray
 
 
 def coefficients(equations: Equations) -> Iterator[Place]:
-    """Entries of Mbar, rows of h and their two parts, and the coefficients of products of speeds; 1 is right."""
+    """Factors of entries of Mbar, rows of h and their two parts, and coefficients of products of speeds."""
     layout, right, (M, velocity_terms, rest) = equations.layout, equations.right, equations.parts
     for name, entries in entries_of_M(equations).items():
         yield factor("coefficient", name, right, entries)

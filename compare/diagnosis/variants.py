@@ -6,7 +6,6 @@ A variant is a cause with Mbar and h as they would be, as `Equations.values` has
 from collections.abc import Iterable, Iterator
 from functools import partial
 from itertools import chain, combinations, permutations, product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,6 +18,9 @@ from .model import MOST_SPEEDS, TINY, Equations, Path
 from .terms import unit_columns
 
 Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
+Functions = tuple[
+    dict[str, np.ndarray], list[tuple[str, str]]
+]  # functions by their names, (states,), and pairs
 Parallel = tuple[str, np.ndarray, np.ndarray]  # a name, a column (states, entries) and its factors (states,)
 OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, and the factors of both
     ("gradient of the kinetic energy in h", "left out"): (1.0, 0.0),
@@ -60,13 +62,9 @@ def program_options(equations: Equations) -> Iterator[Variant]:
     for place, stated, explains, of_speeds, of_gravity in of_h:
         yield option(place, stated, explains, equations.with_bias(of_speeds, of_gravity))
     if q.shape == qd.shape:
-        together, at_rest = (np.concatenate([q, speeds], axis=1) for speeds in (qd, 0.0 * qd))
-        orders = {  # the states, and those at rest
-            "exchanged, bias(qd, q)": (qd, q, 0.0 * q, q),
-            "in turn, q1, qd1, q2, qd2, ...": (*in_turn(together), *in_turn(at_rest)),
-        }
-        for explains, states in orders.items():
-            h, still = Equations(tree, *states[:2]).h, Equations(tree, *states[2:]).h
+        orders = {"exchanged, bias(qd, q)": exchanged, "in turn, q1, qd1, q2, qd2, ...": in_turn}
+        for explains, order in orders.items():
+            h, still = (Equations(tree, *order(q, speeds)).h for speeds in (qd, 0.0 * qd))
             values = equations.with_bias(h - still, still)
             yield option("arguments of bias", "bias(q, qd)", explains, values)
     triangles = {"off": M - M * np.eye(equations.nv)}
@@ -97,20 +95,23 @@ def exchanged_entries(equations: Equations) -> Iterator[Variant]:
 def other_variables(equations: Equations) -> Iterator[Variant]:
     """The position, the speed or both of a joint taken for those of another of its kind."""
     tree, q, qd, layout = equations.tree, equations.q, equations.qd, equations.layout
-    joints = zip(tree.joint_names, tree.coordinates.joints)
-    straight = [(name, joint) for name, joint in joints if joint.kind != "ball"]
+    straight = [(name, joint) for name, joint in equations.joints.items() if joint.kind != "ball"]
     for (name, joint), (other, by) in permutations(straight, 2) if len(straight) <= MOST_SPEEDS else ():
         if joint.kind != by.kind:
             continue
         moved, faster = q.copy(), qd.copy()
         moved[:, joint.q], faster[:, joint.qd] = q[:, by.q], qd[:, by.qd]
         for what, state in {"q": (moved, qd), "qd": (q, faster), "q and qd": (moved, faster)}.items():
-            yield slip(
-                f"{what} of {other} taken for that of {name}", "", "", Equations(tree, *state, layout).right
-            )
+            values = Equations(tree, *state, layout).right
+            yield slip(f"{what} of {other} taken for that of {name}", "", "", values)
 
 
-def in_turn(together: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def exchanged(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return qd, q
+
+
+def in_turn(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    together = np.concatenate([q, qd], axis=1)
     return together[:, ::2], together[:, 1::2]
 
 
@@ -140,7 +141,7 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
 def exchanged_angles(equations: Equations) -> Iterator[Variant]:
     """Sine and cosine of a hinge exchanged in a part of the equations."""
     tree, layout = equations.tree, equations.layout
-    for name, zero, joint in zip(tree.joint_names, tree.reference, tree.coordinates.joints):
+    for (name, joint), zero in zip(equations.joints.items(), tree.reference):
         if joint.kind == "hinge":
             q = equations.q.copy()
             q[:, joint.q] = np.pi / 2.0 + 2.0 * zero - q[:, joint.q]
@@ -151,16 +152,11 @@ def exchanged_angles(equations: Equations) -> Iterator[Variant]:
                 yield variant(2, "angle", f"sine and cosine of {name} exchanged in {part}", "", "", values)
 
 
-class Functions(NamedTuple):
-    """Functions of the positions, (functions, states), with their names, and which are taken for which, (pairs, 2)."""
-
-    names: list[str]
-    values: np.ndarray
-    pairs: np.ndarray  # the wrong and the right one
-
-
 def functions_of(equations: Equations, hinges: dict[str, np.ndarray]) -> Functions:
-    """Sines and cosines of hinges and of their sums, their squares, and products of those of several hinges."""
+    """Sines and cosines of hinges and of their sums, their squares, and products of those of several hinges.
+
+    And these times the lengths of slides; with the pairs that are taken for each other, the wrong one first.
+    """
     values = {"0": 0.0 * equations.q[:, 0], "1": 0.0 * equations.q[:, 0] + 1.0}
     angles, pairs = sums_of(hinges), []
     for name, angle in angles.items():
@@ -177,16 +173,13 @@ def functions_of(equations: Equations, hinges: dict[str, np.ndarray]) -> Functio
         values.setdefault(name, np.prod([values[factor] for factor in name.split(" ")], axis=0))
         for k, factor in enumerate(factors):
             pairs += [(named((*factors[:k], other, *factors[k + 1 :])), name) for other in tables[k][factor]]
-    slides = zip(equations.tree.joint_names, equations.tree.coordinates.joints)
-    lengths = {name: equations.q[:, joint.q.start] for name, joint in slides if joint.kind == "slide"}
     every, all_pairs = dict(values), list(pairs)
-    for name, length in lengths.items():
-        for power, called in {1: name, 2: f"{name}^2"}.items():
-            every |= {f"{called} {function}": length**power * column for function, column in values.items()}
+    for name, joint in equations.joints.items():
+        for power, called in {1: name, 2: f"{name}^2"}.items() if joint.kind == "slide" else ():
+            length = equations.q[:, joint.q.start] ** power
+            every |= {f"{called} {function}": length * column for function, column in values.items()}
             all_pairs += [(f"{called} {wrong}", f"{called} {right}") for wrong, right in pairs]
-    numbers = {name: k for k, name in enumerate(every)}
-    known = [(numbers[wrong], numbers[right]) for wrong, right in all_pairs if wrong in numbers]
-    return Functions(list(every), np.array(list(every.values())), np.array(known))
+    return every, [(wrong, right) for wrong, right in all_pairs if wrong in every]
 
 
 def sums_of(hinges: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -209,44 +202,41 @@ def factors_of(hinge: str) -> dict[str, tuple[str, ...]]:
     """What a product may have of a hinge, and what is taken for it."""
     sine, cosine = f"sin({hinge})", f"cos({hinge})"
     return {
-        "": (), sine: (cosine, ""), cosine: (sine, ""), f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
+        "": (), sine: (cosine, ""), cosine: (sine, ""),
+        f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
         f"{sine}^2": (f"{cosine}^2", sine, ""), f"{cosine}^2": (f"{sine}^2", cosine, ""),
     }  # fmt: skip
 
 
 def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
     """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
-    joints = zip(equations.tree.joint_names, equations.tree.reference, equations.tree.coordinates.joints)
-    hinges = {
-        name: equations.q[:, joint.q.start] - zero for name, zero, joint in joints if joint.kind == "hinge"
-    }
+    joints = zip(equations.joints.items(), equations.tree.reference)
+    hinges = {name: equations.q[:, at.q.start] - zero for (name, at), zero in joints if at.kind == "hinge"}
     yield from exchanged_angles(equations)
     added = list(parallel(search, unit_columns(equations).items()))
     places = [place for place in search.places if place.kind in OF_FACTORS]
     places.sort(key=lambda place: OF_FACTORS.index(place.kind))
     columns = [(place.name, place.column) for place in places if place.column is not None]
     multiplied = list(parallel(search, columns))
-    if not added and not multiplied:
+    if not hinges or not (added or multiplied):
         return
-    functions = functions_of(equations, hinges)
-    wrong, right = functions.pairs.T
-    changes = functions.values[wrong] - functions.values[right]
+    functions, pairs = functions_of(equations, hinges)
+    changes = np.array([functions[wrong] - functions[right] for wrong, right in pairs])
     squares = (changes**2).sum(axis=1)
     for place, column, found in added:
         sizes = changes @ found / squares
         left = np.abs(sizes[:, None] * changes - found).max(axis=1)
         for k in np.flatnonzero(left <= CLOSE * np.abs(sizes)).tolist():
-            names, size = [functions.names[at] for at in functions.pairs[k]], float(sizes[k])
-            yours, other = names if size > 0.0 else names[::-1]
+            size = float(sizes[k])
+            yours, other = pairs[k] if size > 0.0 else pairs[k][::-1]
             terms = {name: f"{abs(size):.6g} {name}".removesuffix(" 1") for name in (yours, other)}
             said = f"{terms[yours]} instead of {terms[other]}"
             said = f"{terms[other]} left out" if yours == "0" else said
             said = f"{terms[yours]} added" if other == "0" else said
             yield variant(2, "angle", place, "", said, search.right + (size * changes[k])[:, None] * column)
-    values = dict(zip(functions.names, functions.values))
     for (place, column, _), name in product(multiplied, hinges):
         for yours, other in permutations(("1", f"sin({name})", f"cos({name})"), 2):
-            change = values[yours] / values[other] - 1.0
+            change = functions[yours] / functions[other] - 1.0
             said = f"{yours} for {other}"
             said = f"{other} left out" if yours == "1" else said
             said = f"{yours} too many" if other == "1" else said

@@ -57,11 +57,11 @@ class Model(OfCompiled):
     @cached_property
     def model(self) -> Any:
         """The model without damping and stiffness, which are part of the force."""
-        model = self.models["RK4"]
+        model = next(iter(self.models.values()))
         return model.replace(**{name: 0.0 * getattr(model, name) for name in STIFFNESS_AND_DAMPING})
 
     def held(self, name: str) -> Array:
-        return np.array(attrgetter(name)(self.models["Euler"]))
+        return np.array(attrgetter(name)(next(iter(self.models.values()))))
 
     def values(self, at: State, force: Array | None = None) -> tuple[Array, ...]:
         """M, h and the acceleration."""

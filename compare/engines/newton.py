@@ -76,7 +76,7 @@ class Model(SteppedModel):
 
         file, compiled = self.file, Source(self.file.path, self.file.floating).model
         if (self.model.joint_coord_count, self.model.joint_dof_count) != (compiled.nq, compiled.nv):
-            raise OtherJoints(f"it has {self.model.joint_dof_count} speeds, the file has {compiled.nv}")
+            raise OtherJoints(self.model.joint_dof_count, compiled.nv)
         places, joints = joint_places(compiled), file.coordinates.places.joints
 
         def slides_first(name: str) -> tuple[int, bool]:
@@ -114,6 +114,8 @@ class Model(SteppedModel):
         else:
             self.read[name] = np.array(values)
             getattr(self.model, f"joint_{name}").assign(values[self.order.v])
+        if name == "armature" and values[self.order.is_of_free()].any():
+            return False  # it acts on the velocity of the centre of mass
         return bool(self.near(self.fields()[name], values).all())
 
     def links(self, at: State) -> list[Link]:

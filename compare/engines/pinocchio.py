@@ -56,7 +56,7 @@ class Model(ReadModel):
                 circles += [k] * (part.nq == 2)
                 q, v, k = q + part.nq, v + part.nv, k + 1
         if self.model.nv != self.file.coordinates.nv:
-            raise OtherJoints(f"it has {self.model.nv} speeds, the file {self.file.coordinates.nv}")
+            raise OtherJoints(self.model.nv, self.file.coordinates.nv)
         self.order = Order(self.file, starts, XYZW, XYZW, linear_in_world=False, circles=tuple(circles))
 
     @property

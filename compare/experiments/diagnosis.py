@@ -1,6 +1,6 @@
 """What explains a difference in Mbar, h and accelerations, of a file's robot or of a user's equations."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache, partial
 from typing import NamedTuple
@@ -75,13 +75,12 @@ class Found(NamedTuple):
 
     engine: str
     states: int
-    conditions: list[Condition]  # on Mbar and h of a user's own; [] of MuJoCo's
-    too_slow: bool  # whether the conditions were skipped because the equations take too long
-    diagnosis: Diagnosis  # of Mbar and h
-    ratio: float  # of a difference of Mbar or h to its tolerance, the largest
     of_forces: tuple[Cause, ...]  # what else acts in the accelerations
     force_ratio: float  # of a force left over to its tolerance, the largest
-    curve: Curve | None  # of a user's own Mbar and h, where nothing explains their difference
+    diagnosis: Diagnosis = Diagnosis(False)  # of Mbar and h
+    ratio: float = 0.0  # of a difference of Mbar or h to its tolerance, the largest
+    conditions: Sequence[Condition] | None = ()  # on a user's own Mbar and h; None: they take too long
+    curve: Curve | None = None  # of a user's own Mbar and h, where nothing explains their difference
     alone: str | None = None  # what explains accelerations, if there is neither Mbar nor h
 
     @property
@@ -100,19 +99,15 @@ def diagnosed(setup: Setup) -> Found:
     """What explains the difference of the engine that is compared with the robot's Tree; computed once."""
     tree, sample, engine = setup.robot.tree, setup.random.first(STATES_ASKED), setup.robot.compared[0]
     engine = "own" if engine == "own" else "mujoco"
-    if (
-        setup.reading is not None and tree == setup.reading.tree
-    ):  # its numbers are said in the frames of the file
-        tree = tree_with_sites(setup.reading)
+    if setup.reading is not None and tree == setup.reading.tree:
+        tree = tree_with_sites(setup.reading)  # its numbers are said in the frames of the file
     dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
     if isinstance(dynamics, OwnDynamics) and not dynamics.has("mass_matrix"):
         return of_accelerations_alone(dynamics, tree, sample)
     values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
-    if isinstance(dynamics, OwnDynamics):
-        broken, too_slow = conditions_of(dynamics, values)
-        stated, is_slow = Stated(dynamics.equations.joints, "option"), dynamics.equations.seconds > QUICK
-    else:
-        broken, too_slow, stated, is_slow = [], False, None, False
+    own, tested = dynamics if isinstance(dynamics, OwnDynamics) else None, conditions_of(dynamics, values)
+    stated = Stated(own.equations.joints, "option") if own else None
+    is_slow = own is not None and own.equations.seconds > QUICK
     functions = (None, stated, None) if is_slow else (partial(dynamics.bias, q), stated, dynamics.mass_matrix)
     diagnosis = diagnose(tree, values, SECONDS, *functions)
     right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
@@ -120,8 +115,7 @@ def diagnosed(setup: Setup) -> Found:
     left_over = LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau))
     is_drawn = engine == "own" and not is_slow and diagnosis.differs and not diagnosis.causes
     curve = telling_curve(dynamics, tree, values, right) if is_drawn else None
-    forces = left_over.causes, left_over.ratio
-    return Found(engine, len(q), broken, too_slow, diagnosis, ratio, *forces, curve)
+    return Found(engine, len(q), left_over.causes, left_over.ratio, diagnosis, ratio, tested, curve)
 
 
 def of_accelerations_alone(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> Found:
@@ -133,14 +127,13 @@ def of_accelerations_alone(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample
     if ratio > 1.0:
         asked = Asked(tree, equations.coordinates, equations, Stated(equations.joints, "option"))
         why = of_accelerations(asked, Values.of(tree, q, qd, None, None), tau, qdd)
-    return Found("own", len(q), [], False, Diagnosis(False), 0.0, why.causes, ratio, None, why.text)
+    return Found("own", len(q), why.causes, ratio, alone=why.text)
 
 
 def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Values) -> Curve:
     """The entry that differs most, and the coordinate along which its difference changes most."""
-    ratios = np.nan_to_num(
-        share_of(np.abs(values.packed - right.packed), values.packed_tolerance), posinf=0.0
-    )
+    ratios = share_of(np.abs(values.packed - right.packed), values.packed_tolerance)
+    ratios = np.nan_to_num(ratios, posinf=0.0)
     state, k = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
     equations, qd = Equations(tree, values.q, values.qd), np.tile(values.qd[state], (POINTS, 1))
     coordinates, curves = equations.coordinates, []
@@ -154,17 +147,17 @@ def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Val
     return max(curves, key=lambda curve: np.nan_to_num(np.ptp(curve.yours - curve.right)))
 
 
-def conditions_of(dynamics: OwnDynamics, values: Values) -> tuple[list[Condition], bool]:
-    """The conditions at as many of the states as there is time for, and whether that is none."""
-    if not values.are_finite:
-        return [], False
+def conditions_of(dynamics: Dynamics, values: Values) -> list[Condition] | None:
+    """The conditions on a user's own Mbar and h at as many states as there is time for; None: at none."""
+    if not isinstance(dynamics, OwnDynamics) or not values.are_finite:
+        return []
     q, qd = values.q, values.qd
     calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * dynamics.coordinates.nv
     count = dynamics.equations.affordable(calls * len(q), SECONDS_OF_CONDITIONS) // calls
     if count == 0:
-        return [], True
+        return None
     every = conditions(dynamics.mass_matrix, dynamics.bias, dynamics.coordinates, q[:count], qd[:count])
-    return [condition for condition in every if np.isfinite(condition.tolerance)], False
+    return [condition for condition in every if np.isfinite(condition.tolerance)]
 
 
 def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
@@ -178,7 +171,7 @@ def rows(setup: Setup) -> DiagnosisResult:
     """A row for each explanation; a check of each condition, of Mbar and h, and of accelerations."""
     found = diagnosed(setup)
     result = DiagnosisResult("diagnosis", curve=found.curve)
-    for condition in found.conditions:
+    for condition in found.conditions or ():
         check(result, found, condition)
     if found.alone is None:
         is_known = found.diagnosis.differs or np.isfinite(found.ratio)
@@ -190,7 +183,7 @@ def rows(setup: Setup) -> DiagnosisResult:
     check(result, found, Condition(name, found.force_ratio, 1.0, "", finding))
     names = [field.name for field in fields(CauseRow)]
     result.rows = [CauseRow(**{name: getattr(cause, name) for name in names}) for cause in found.causes]
-    if found.too_slow:
+    if found.conditions is None:
         result.find("too_slow")
     if not result.notes:
         result.find("nothing")

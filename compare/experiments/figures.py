@@ -58,8 +58,8 @@ def beyond_tolerance(ax: Axes, tolerance: float, text: str) -> None:
     ax.axvline(tolerance, color=RED, linewidth=2)
     edge = (0.84, 0.37, 0.0, 0.35)
     ax.axvspan(tolerance, 1e30, facecolor="none", edgecolor=edge, hatch="////", linewidth=0)
-    ax.annotate(f"tolerance {text}", (tolerance, 0.02), (-4, 0), xycoords=("data", "axes fraction"),
-                textcoords="offset points", color=RED, rotation=90, ha="right", va="bottom", fontsize=7.5,
+    ax.annotate(f"tolerance {text}", (tolerance, 0.02), (4, 0), xycoords=("data", "axes fraction"),
+                textcoords="offset points", color=RED, rotation=90, ha="left", va="bottom", fontsize=7.5,
                 path_effects=OUTLINE)  # fmt: skip
 
 

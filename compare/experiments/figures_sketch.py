@@ -14,6 +14,7 @@ from ..report.style import BLUE, GREEN, GREY, RED, WIDTH, file_name, joint_lines
 from ..robots import Robot
 from ..robots.coordinates import free_joints
 from ..robots.stick import AZIMUTH, ELEVATION, stick_figure
+from .figures import OUTLINE
 
 MOST_NAMED = 6  # joints, and bodies, that are named in a sketch
 KIND_COLOURS = {"hinge": BLUE, "slide": RED, "ball": GREEN}
@@ -39,7 +40,8 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
         draw_joints(ax, robot, arrows[name], is_small)
         ax.scatter(*coms[name].T, color="black", s=25 if is_small else 8, depthshade=False)
         for number, com in enumerate(coms[name] if is_small else (), start=1):
-            ax.text(*(com + size * np.array([0.12, 0.0, -0.1])), str(number), fontsize=9)
+            beside = com + size * np.array([0.1, 0.0, -0.16])
+            ax.text(*beside, str(number), fontsize=9, path_effects=OUTLINE)
         for axis, label in zip((ax.xaxis, ax.yaxis, ax.zaxis), robot.axes):
             axis.set_label_text(f"{label}, m")
             axis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
@@ -73,7 +75,7 @@ def draw_joints(ax: Any, robot: Robot, arrows: np.ndarray, is_small: bool) -> No
             ax.plot(*np.stack([origin - axis, origin]).T, color=colour, linewidth=1.2, linestyle="--")
         if is_small:
             place = origin + (0.3 if joint.kind == "ball" else 1.3) * axis
-            ax.text(*place, robot.symbol(name), color=colour)
+            ax.text(*place, robot.symbol(name), color=colour, path_effects=OUTLINE)
 
 
 def axes(robot: Robot, q: np.ndarray, length: float) -> np.ndarray:

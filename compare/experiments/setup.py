@@ -38,11 +38,12 @@ def nothing(*_: Any) -> None:
 class Request(NamedTuple):
     """What is asked of stability and of reduction for a file, beside its own step.
 
-    step: s, and an integrator of MuJoCo. posture: a name, or numbers separated by commas. control_period, delay: s, of a
-    program that commands the actuators; kp, kv: its gains for those that are no servos. at_speed: growth along a motion.
+    step: s, and an integrator of MuJoCo. posture: a name, or numbers with commas. control_period, delay: s,
+    of a program that commands the actuators; kp, kv: its gains for those that are no servos. at_speed: growth
+    along a motion.
 
-    Of reduction: error, rad or m, that is allowed; points: names of bodies or sites, separated by commas; controls: times and
-    controls by the names of actuators; write: the path of the smaller file.
+    Of reduction: error, rad or m, that is allowed; points: names of bodies or sites, separated by commas;
+    controls: times and controls by the names of actuators; write: the path of the smaller file.
     """
 
     step: tuple[float, str] | None = None

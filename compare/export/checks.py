@@ -11,9 +11,9 @@ from tmt.derivation.quantities import quantity_of
 from tmt.exact.many import Pairs, exact_of_many
 
 from ..core import timing
-from ..engines.mujoco.calls import MinimalCalls
+from ..engines.mujoco.calls import loops
 from ..experiments.quantities import QUANTITIES, Quantity
-from ..judge.agree import closest
+from ..judge.agree import closest, share_of
 from ..judge.entries import Entries, unit
 from ..judge.scale import FACTOR
 from ..robots import Robot
@@ -139,10 +139,7 @@ def random_states(robot: Robot, count: int) -> list[Array]:
 def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
     """The difference with the largest share of its tolerance, and the share; inf where it is no number."""
     at = closest(difference, tolerance)
-    value, most = abs(float(difference[at])), float(tolerance[at])
-    if value == 0.0:
-        return value, 0.0
-    return value, value / most if most and np.isfinite(value) else np.inf
+    return abs(float(difference[at])), float(share_of(np.abs(difference), tolerance)[at])
 
 
 def times(
@@ -157,9 +154,9 @@ def times(
     for name in names:
         for flag, library in libraries.items():
             calls[name, flag], _ = program.call(name, states, library)
-    if not MinimalCalls.unavailable():
-        loops = MinimalCalls(compared.mujoco.of(compared.robot.case())).loops(*(x[0] for x in states[:3]))
-        calls["mujoco"] = partial(loops["MuJoCo, mj_forward"], count)
+    of_mujoco = loops(compared.mujoco.of(compared.robot.case()), *(x[0] for x in states[:3]))
+    if of_mujoco:
+        calls["mujoco"] = partial(of_mujoco["MuJoCo, mj_forward"], count)
     seconds = timing.fastest(calls, ROUNDS, time.thread_time)
     ns = {key: 1e9 * taken / count for key, taken in seconds.items()}
     rows = []

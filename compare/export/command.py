@@ -2,6 +2,7 @@
 
 import argparse
 import hashlib
+import os
 import re
 import shutil
 import time
@@ -68,6 +69,9 @@ def equations_status(arguments: Sequence[str], command: str) -> int:
         parser.error("expected a new folder: --out DIR")
     if Path(options.out).exists():
         parser.error(f"--out: {options.out} exists; expected the name of a new folder")
+    above = next(path for path in Path(options.out).absolute().parents if path.exists())
+    if not (above.is_dir() and os.access(above, os.W_OK)):
+        parser.error(f"--out: {above} is not a folder that can be written to")
     return write_equations(options, command)
 
 

@@ -136,12 +136,12 @@ class CProgram(Program):
         cpu = Path("/proc/cpuinfo")
         if not cpu.is_file() or " fma " not in cpu.read_text(encoding="utf-8"):
             return {}
-        with ThreadPoolExecutor() as compilers:
-            libraries = compilers.map(self.of_processor, OF_PROCESSOR)
-            return dict(zip(OF_PROCESSOR, libraries))
 
-    def of_processor(self, flag: str) -> ctypes.CDLL:
-        return self.of_states(f"states{flag.replace('=', '_')}", "-ffp-contract=fast", flag)
+        def library(flag: str) -> ctypes.CDLL:
+            return self.of_states(f"states{flag.replace('=', '_')}", "-ffp-contract=fast", flag)
+
+        with ThreadPoolExecutor() as compilers:
+            return dict(zip(OF_PROCESSOR, compilers.map(library, OF_PROCESSOR)))
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")

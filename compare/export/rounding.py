@@ -1,8 +1,8 @@
 """How far rounding may take the results of a row of operations: a bound of first order, carried along.
 
-Each operation adds the rounding of its own result to what its operands bring (Higham, Accuracy and Stability of
-Numerical Algorithms, 2002, section 3.3). In units of eps, twice the unit of rounding, so that fused operations
-and functions that are off by one unit are within it.
+Each operation adds the rounding of its own result to what its operands bring (Higham, Accuracy and Stability
+of Numerical Algorithms, 2002, section 3.3). In units of eps, twice the unit of rounding, so that fused
+operations and functions that are off by one unit are within it.
 """
 
 from collections.abc import Callable, Sequence

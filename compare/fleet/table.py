@@ -95,7 +95,7 @@ def row_of_data(data: object) -> FileRow | None:
 def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Reference) -> None:
     """Set the verdict, reason, largest share of a tolerance, and step of a row.
 
-    lost: parts of the report that broke off. The reason names an unstable step and joints of other names, too.
+    lost: parts of the report that broke off. The reason names an unstable step and joints of other names too.
     """
     sections = report.sections
     failed, top = failures(sections), worst(sections)
@@ -156,7 +156,7 @@ def by_file(table: str) -> dict[str, dict[str, str]]:
 
 
 def changes(before: Mapping[str, Mapping[str, str]], rows: Sequence[FileRow]) -> list[str]:
-    """The changes since an earlier fleet, a line for each file: verdict, step, limit; new and removed files."""
+    """The changes since an earlier fleet, a line for each file: verdict, step, limit, new, removed."""
     now, lines = by_file(table_of(rows)), []
     for file in sorted(before.keys() | now.keys()):
         old, new = before.get(file, {}), now.get(file, {})

@@ -69,7 +69,7 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
     out.mkdir()
     setup = experiment.setup_of(compared, options.is_quick)
     with ThreadPoolExecutor(1) as workers:
-        examined = experiment.examine(names, setup, out, Terminal(), workers, Clock())
+        examined = experiment.Run(names, setup, out, Terminal(), workers, Clock()).examined()
     origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
     origin["seconds"] = round(time.process_time() - began, 1)
     report, parts = write_report(out, examined, reasons, origin, compared)

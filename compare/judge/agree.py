@@ -57,10 +57,11 @@ def agree(
     result: Result, sample: Sample, quantity: str, unit: str, values: ArrayLike, mujoco_values: ArrayLike,
     scale: ArrayLike, exact: "Pairs | None" = None,
 ) -> None:  # fmt: skip
-    """Add a row and a check: the difference between two engines that is closest to its tolerance, 64 eps x scale.
+    """Add a row and a check: the difference of two engines that is closest to its tolerance, 64 eps x scale.
 
-    values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the values for
-    a scale of each entry. exact: at the first states; of each engine's distance from them there is a check too.
+    values, mujoco_values: (states, ...). scale: a number or (states,), or with as many dimensions as the
+    values for a scale of each entry. exact: at the first states; of each engine's distance from them there is
+    a check too.
     """
     measured = {quantity: worst_of_each(np.subtract(values, mujoco_values), scale)}
     if exact is not None and len(exact.high):
@@ -73,9 +74,9 @@ def agree(
         engine=result.label, scene=sample.name, quantity=quantity, unit=unit, states=len(sample.q),
         largest_difference=float(difference.max()) if np.isfinite(difference).all() else None,
         worst_difference=check.value, bar=check.tolerance, difference_over_bar=check.over_tolerance,
-        scale=float(scales[worst]), exact_states=None if exact is None else len(exact.high), worst_state=check.note,
-        worst_q=in_full(sample.q[worst]), worst_qd=in_full(sample.qd[worst]), worst_tau=in_full(sample.tau[worst]),
-        passed=check.passed, **dict(zip(DISTANCES, in_eps)),
+        scale=float(scales[worst]), exact_states=None if exact is None else len(exact.high),
+        worst_state=check.note, worst_q=in_full(sample.q[worst]), worst_qd=in_full(sample.qd[worst]),
+        worst_tau=in_full(sample.tau[worst]), passed=check.passed, **dict(zip(DISTANCES, in_eps)),
     )  # fmt: skip
     result.rows.append(row)
     result.shown = [name for name, (field, _) in row.columns().items() if field in SHOWN]

@@ -15,12 +15,12 @@ W is the largest of all L_i: MuJoCo adds moments about the centre of mass of the
 to m W^2 leave m L_i^2, and each is rounded by eps: 64 eps (W / 8)^2. R is the largest distance of the body
 from the world's origin: its position, and so each of its levers, is rounded by eps R. Every term of a body is
 multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the rounding of
-those before it and adds its own. Bodies that MuJoCo fuses one after another are turned into the principal axes of
-each sum and back, all that are in it: k is then multiplied by the number of them. A movement of joint j changes
-at most four factors of a term, a lever and those of an acceleration: of a turn each by its own size, so that the
-scale of d(Mbar qdd + h)/dq_j is four times that of the terms of the bodies that j moves; of a slide levers by 1,
-accelerations by S^2. Where a system is solved, errors of eps in Mbar and in the forces are multiplied by
-|Mbar^-1|, entry by entry: a condition number would depend on the units.
+those before it and adds its own. Bodies that MuJoCo fuses one after another are turned into the principal
+axes of each sum and back, all that are in it: k is then multiplied by the number of them. A movement of joint
+j changes at most four factors of a term, a lever and those of an acceleration: of a turn each by its own
+size, so that the scale of d(Mbar qdd + h)/dq_j is four times that of the terms of the bodies that j moves; of
+a slide levers by 1, accelerations by S^2. Where a system is solved, errors of eps in Mbar and in the forces
+are multiplied by |Mbar^-1|, entry by entry: a condition number would depend on the units.
 """
 
 from functools import cached_property
@@ -156,7 +156,7 @@ class Entries:
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
 
     def force_rates(self, qdd: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at these accelerations."""
+        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at qdd."""
         tree, sizes = self.tree, np.abs(np.broadcast_to(qdd, self.qd.shape))
         turning = sizes @ self.turns.T + self.spin**2  # (states, m)
         pushed = np.einsum("sbi,si->sb", self.t, sizes) + 2.0 * self.spin * self.speed
@@ -190,16 +190,16 @@ class Entries:
         return tmt.Derivatives(by_q, by_qd, by_tau, by_movement, by_speed)
 
     def step(self, dt: float, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
-        """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through the step.
+        """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through it.
 
-        by: the derivatives at the start, of which a step makes the first terms of an exponential; scale: theirs.
+        by: the derivatives at the start, of which a step makes the first terms of an exponential; scale:
+        theirs.
         """
         nv = self.qd.shape[1]
         rates, sizes = np.zeros((2, len(self.q), 3 * nv, 3 * nv))
         rates[:, :nv, nv : 2 * nv] = np.eye(nv)
-        sizes[:, :nv, nv : 2 * nv] = np.equal.outer(
-            self.of_speed, self.of_speed
-        )  # turns of a ball add to each other
+        # turns of a ball add to each other
+        sizes[:, :nv, nv : 2 * nv] = np.equal.outer(self.of_speed, self.of_speed)
         rates[:, nv : 2 * nv] = np.abs(np.concatenate(by[:3], axis=2))
         sizes[:, nv : 2 * nv] = np.concatenate(scale[:3], axis=2)
         carried = term = np.broadcast_to(np.eye(3 * nv), rates.shape)

@@ -38,7 +38,7 @@ def measured_order(
 
 
 def is_higher(measured: float, nominal: int) -> bool:
-    """Whether an error falls faster than the order of the method says, as some do from a state without forces."""
+    """Whether an error falls faster than the method's order, as some do from a state without forces."""
     return measured > nominal + ORDER_MARGIN
 
 
@@ -46,9 +46,10 @@ def check_order(
     result: Result, where: str, nominal: int, measured: float, error: str = "error", note: str = "",
     twin: float | None = None,
 ) -> Check:  # fmt: skip
-    """The measured order is at least the nominal one and, where tmt's same scheme has a `twin`, that: within ORDER_MARGIN.
+    """The order is at least the nominal one and that of a `twin`, tmt's same scheme: within ORDER_MARGIN.
 
-    A higher order alone is no fault: the leading term of an error may vanish in a scene. Of order 8 it is at least 7.
+    A higher order alone is no fault: the leading term of an error may vanish in a scene. Of order 8 it is at
+    least 7.
     """
     if least := LEAST_ORDER.get(nominal):
         name = f"measured order, nominal {nominal}"

@@ -102,20 +102,17 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
 def work(case: Case, q: np.ndarray) -> np.ndarray:
     """The work of the constant torque and of a controller's position gains along a run, J, (times,).
 
-    At hinges and slides it follows from the movement from the start. A ball's torque is constant in axes that
-    turn with it: its work depends on the path, and is added up from state to state.
+    It is added up from state to state, as a ball's torque is constant in axes that turn with it.
     """
-    if case.tree.position_gain:
-        mean = case.tau - (fed_back_at(case.tree, q) + fed_back_at(case.tree, q[0])) / 2.0  # as it is linear
-        return np.sum(case.coordinates.difference(q, q[0]) * mean, axis=1)
-    if not case.coordinates.has_balls:
-        return (q - q[0]) @ case.tau
-    return np.append(0.0, np.cumsum(case.coordinates.difference(q[1:], q[:-1]) @ case.tau))
+    torque = case.tau - fed_back_at(case.tree, q)  # linear in q: between two states its mean acts
+    mean, moved = (torque[1:] + torque[:-1]) / 2.0, case.coordinates.difference(q[1:], q[:-1])
+    return np.append(0.0, np.cumsum(np.sum(moved * mean, axis=1)))
 
 
 def fed_back_at(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """The torque of a controller's position gains at q (..., nq), N m or N, (..., nv), to be subtracted."""
-    return q[..., tree.coordinates.first_positions] @ np.array(tree.position_gain).T
+    positions = q[..., tree.coordinates.first_positions]
+    return positions @ np.array(tree.position_gain).T if tree.position_gain else np.zeros_like(positions)
 
 
 def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:

@@ -43,10 +43,8 @@ def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndar
 def motion_scale(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> np.ndarray:
     """Convective and Euler terms of each entry of the bias, absolute values, N m or N, (states, nv)."""
     bodies, inertia = method.bodies(tree, list(q.T), list(qd.T)), np.array(tree.inertia)
-    T, B, v_conv, w_conv, omega = (
-        gather([getattr(body, name) for body in bodies], q.shape[:1])
-        for name in ("T", "B", "v_conv", "w_conv", "omega")
-    )
+    terms = [[getattr(body, name) for body in bodies] for name in ("T", "B", "v_conv", "w_conv", "omega")]
+    T, B, v_conv, w_conv, omega = (gather(term, q.shape[:1]) for term in terms)
     moments = np.abs(np.einsum("bij,sbj->sbi", inertia, w_conv))
     moments += np.abs(np.cross(omega, np.einsum("bij,sbj->sbi", inertia, omega)))
     newton = np.einsum("sbic,b,sbc->si", np.abs(T), tree.mass, np.abs(v_conv))

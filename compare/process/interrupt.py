@@ -1,8 +1,8 @@
 """Ctrl-C, SIGTERM and SIGHUP end a run with status 2 within a second.
 
-A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So the signals are blocked,
-in worker processes too, and a thread waits for them; where signals cannot be blocked (Windows), a handler has to do. Only
-`python -m compare` uses this.
+A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So signals
+are blocked, in workers too, and a thread waits for them; where they cannot be (Windows), a handler has to do.
+Only `python -m compare` uses this.
 """
 
 import os
@@ -31,7 +31,7 @@ class Now:
 
 
 def listen() -> None:
-    """From now on an interrupt ends the process. Ignored signals (nohup, background of a script) stay ignored."""
+    """From now on an interrupt ends the process. Ignored signals (nohup, background) stay ignored."""
     numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
     numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
     Now.listening = True

@@ -1,6 +1,6 @@
 """The files that a model consists of, and whether they can be read.
 
-mju_getXMLDependencies of MuJoCo 4.0.0 searches for height fields and stripped paths where the compiler does not. So
+mju_getXMLDependencies of MuJoCo 4.0.0 looks for height fields and stripped paths where the compiler does not.
 `needed_by` searches every folder that the compiler may use, and takes what exists.
 """
 

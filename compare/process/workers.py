@@ -1,4 +1,4 @@
-"""Processes that make calls: the two workers of a run, the process of an engine, those of a fleet; and the clock of a run."""
+"""Processes that make calls: those of a run, of an engine, of a fleet; and the clock of a run."""
 
 import importlib
 import logging
@@ -75,7 +75,7 @@ class WorkerEnded(RuntimeError):
 
 @dataclass(frozen=True)
 class Beginning:
-    """What a process does before its first call. It ends when its parent does, and then deletes the folder."""
+    """What a process does before its first call. It ends with its parent, and then deletes the folder."""
 
     environment: tuple[tuple[str, str], ...] = ()
     is_silent: bool = False  # what it prints is lost, that of its libraries of C too
@@ -104,7 +104,7 @@ class Beginning:
 class Whole(BaseProcess):
     """A process whose start is not interrupted, and whose end is noticed after what it has sent.
 
-    One that is half started complains when its parent ends. And Pebble loses a call if it notices the end of its process first.
+    One that is half started complains when its parent ends. Pebble loses a call if it sees that end first.
     """
 
     is_noticed = False
@@ -118,7 +118,7 @@ class Whole(BaseProcess):
         super().terminate()
 
     def is_alive(self) -> bool:
-        """Whether it runs; True once more after it has failed, for a tenth of a second until Pebble asks again."""
+        """Whether it runs; True once more after it has failed, until Pebble asks again."""
         was_noticed, is_alive = self.is_noticed, super().is_alive()
         self.is_noticed = was_noticed or not is_alive
         return is_alive or not (was_noticed or self.exitcode == 0)
@@ -176,7 +176,7 @@ class Workers:
         return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=context)
 
     def submit(self, function: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> "Future[T]":
-        """The future of a call, which raises what the function raises, TimeoutError after the time limit, or WorkerEnded."""
+        """The future of a call; it raises what the function raises, TimeoutError or WorkerEnded."""
         call = Call(partial(function, *arguments, **named), self.clock.task)
         self.pending.add(call.future)
         self.start(call)

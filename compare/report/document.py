@@ -25,11 +25,8 @@ from .verdict import Figure, Parts, Report, Section, failures, headline, outcome
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
-MAIN_TABLES = {
-    "what_should_i_use": "What should I use?",
-    "engines_answer": "Which engine?",
-}  # further tables of report.md, with their titles
-# columns of failing checks
+# further tables of report.md, with their titles; columns of failing checks
+MAIN_TABLES = {"what_should_i_use": "What should I use?", "engines_answer": "Which engine?"}
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
 
@@ -55,18 +52,14 @@ class Document:
     """One report in one medium. folder: where its figures are, for a page; None: report.md."""
 
     def __init__(self, report: Report, parts: Parts, folder: Path | None = None):
-        self.report, self.parts, self.folder = report, parts, folder
-        self.page = folder is not None
+        self.report, self.parts, self.page = report, parts, folder is not None
         self.file = "index.html" if self.page else "report.md"
-        data = {"page": self.page, "embedded": self.embedded}
+        data: dict[str, Any] = {"page": self.page, "embedded": embedded}
         data |= {"outcome": outcome, "standing": standing, "headline": headline}
+        data["drawn"] = folder / "figures" if folder else None
         # its attributes are the macros
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)
         self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
-
-    def embedded(self, figure: Figure) -> tuple[Markup, int, int]:
-        assert self.folder is not None
-        return embedded(self.folder / "figures" / figure.path)
 
     def body(self) -> list[str]:
         """All parts below the verdict; those that break are left out."""

@@ -20,7 +20,7 @@ COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsh
 
 
 def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
-    """Write the files of a report, beside its figures; parts that break are left out, and named in all files."""
+    """Write the files of a report, beside its figures; parts that break are left out and named."""
     parts = Parts() if parts is None else parts
     (folder / "tables").mkdir()
     for section in report.sections:

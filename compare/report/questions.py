@@ -25,36 +25,25 @@ def answers(sections: Sequence[Section], robot: Robot) -> pd.DataFrame | None:
 def answer(ran: Ran, kind: str, *about: Any) -> Finding:
     """One answer; kind, about: see robots.Question."""
     if kind == "figure":
-        return Finding("questions", "figure", {"name": about[0]})
+        return Finding("questions", kind, {"name": about[0]})
     if kind == "printed":
-        if "published" not in ran:
-            return Finding("questions", "not_run")
-        items = [printed(ran["published"], item) for item in about]
-        return Finding("questions", "printed", {"items": items})
+        rows = ran["published"].result.rows if "published" in ran else []
+        items = {item: [row for row in rows if row.item == item] for item in about}
+        return Finding("questions", kind, {"items": items, "is_run": "published" in ran})
     places = range(0, len(about), 3)
     found = [largest(ran, *about[place : place + 3]) for place in places]
     more = [ran[about[place]].result.answer for place in places if about[place] in ran]
     values = {"answers": found, "more": [say(finding) for finding in more if finding]}
-    return Finding("questions", "largest", values)
+    return Finding("questions", kind, values)
 
 
 def largest(ran: Ran, experiment: str, quantity: str, where: Mapping[str, Any]) -> dict[str, Any]:
     """The largest difference in an experiment: of the rows with these values, or of this quantity."""
-    about = {"experiment": experiment, "quantity": quantity}
-    if experiment not in ran:
-        return about | {"state": "absent"}
     where = where or {"quantity": quantity}
-    records = [row.record() for row in ran[experiment].result.rows]
+    records = [row.record() for row in ran[experiment].result.rows] if experiment in ran else []
     rows = [record for record in records if all(record.get(key) == value for key, value in where.items())]
-    if not rows or any(row["largest_difference"] is None for row in rows):
-        return about | {"state": "diverged" if rows else "empty"}
-    top = max(rows, key=lambda row: row["largest_difference"])
-    numbers = {"difference": float(top["largest_difference"]), "unit": top["unit"], "scene": top["scene"]}
-    return about | numbers | {"state": "known"}
-
-
-def printed(section: Section, item: str) -> dict[str, Any]:
-    """A printed item, with the numbers of both engines; its unit is None where there is no result."""
-    rows = [record for record in (row.record() for row in section.result.rows) if record["item"] == item]
-    values = {name: [row[name] for row in rows] for name in ("published", "tmt", "mujoco")}
-    return {"item": item, "unit": rows[0]["unit"] if rows else None, **values}
+    state = "absent" if experiment not in ran else "known" if rows else "empty"
+    if any(row["largest_difference"] is None for row in rows):
+        state, rows = "diverged", []
+    top = max(rows, key=lambda row: row["largest_difference"], default=None)
+    return {"experiment": experiment, "quantity": quantity, "state": state, "row": top}

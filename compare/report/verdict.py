@@ -144,44 +144,33 @@ def verdict(
     checks = [check for section in checked for check in section.judged]
     explained = [check for section in sections for check in section.explained]
     stating = [check for section in checked if section.record.states_causes for check in section.failed]
-    unexplained = [check for check in checks if stands(check, explained, stating)]
-    failing = failures(checked)
+    failing, top = failures(checked), worst(checked)
     unconfirmed = [check for check in failing.unconfirmed if check not in explained]
     failing = failing._replace(unconfirmed=unconfirmed)
     differing = [section for section in checked if section.record.compares and failures([section]).differing]
-    top = worst(checked)
-    values: dict[str, Any] = {"experiments": experiments, "sections": sections, "causes": causes}
-    values |= {"compared": subject or "The two models", "robot": robot or "the robot"}
-    values |= {"names": [section.name for section in differing or checked], "differ": bool(differing)}
-    values |= {"checked": checked, "checks": checks, "failing": failing}
-    values |= {"explained": explained, "stating": stating, "unexplained": unexplained}
-    values["top"] = top if top and top.value and not any(failing) else None
-    lines = block("verdict", "verdict", **values)
+    lines = block(
+        "verdict", "verdict", compared=subject or "The two models", robot=robot or "the robot",
+        experiments=experiments, sections=sections, checked=checked, checks=checks, causes=causes,
+        names=[section.name for section in differing or checked], differ=bool(differing), failing=failing,
+        explained=explained, stating=stating,
+        unexplained=[check for check in checks if check.failed and check not in stating + explained],
+        top=top if top and top.value and not any(failing) else None,
+    )  # fmt: skip
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
 
 
-def stands(check: Check, explained: Sequence[Check], stating: Sequence[Check]) -> bool:
-    """Whether a check fails, states no cause, and no cause explains it."""
-    return check.failed and check not in stating and check not in explained
-
-
-def in_words(section: Section, kind: str) -> str:
-    """The macro `outcome` or `standing` for a section."""
+def outcome(section: Section, kind: str = "outcome") -> str:
+    """Whether a section passes, in a sentence; `standing`: in a few words."""
     numbers = {"checks": section.judged, "failed": section.failed, "explained": section.explained}
     counts = {name: len(checks) for name, checks in numbers.items()}
     return say(Finding("verdict", kind, {**counts, "failing": failures([section])}))
-
-
-def outcome(section: Section) -> str:
-    """Whether a section passes, in a sentence."""
-    return in_words(section, "outcome")
 
 
 def standing(section: Section) -> tuple[bool | None, str]:
     """Whether a section passes, also in words; None: not all was judged, or nothing compared."""
     *failing, not_judged = failures([section])
     is_open = bool(not_judged) or not section.judged
-    return (False if any(failing) else None if is_open else True), in_words(section, "standing")
+    return (False if any(failing) else None if is_open else True), outcome(section, "standing")
 
 
 def headline(section: Section) -> str:

@@ -1,7 +1,8 @@
 """The actuators of a robot.
 
-The law of an actuator is MuJoCo's: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, along the length l of its
-transmission, with u its control, or its activation. MuJoCo documentation, computation, actuation model.
+The law of an actuator is MuJoCo's: force = (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot, along the length l
+of its transmission, with u its control, or its activation. MuJoCo documentation, computation, actuation
+model.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,8 +19,8 @@ Posture = str | tuple[float, ...]  # its name, or numbers
 class Actuator:
     """An actuator at a joint, a tendon or another transmission of MuJoCo.
 
-    moment: dl/dq, (nv,), if it is the same at every posture (a hinge, a slide, a fixed tendon), else None: then MuJoCo
-    computes it. Forces are N or N m, times the gear.
+    moment: dl/dq, (nv,), if it is the same at every posture (a hinge, a slide, a fixed tendon), else None:
+    then MuJoCo computes it. Forces are N or N m, times the gear.
     """
 
     name: str
@@ -118,8 +119,9 @@ def controller(
 ) -> Controller:
     """The controller at a posture: sum of J' ((g0 u + b0) + (g1 u + b1) J q + (g2 u + b2) J qd), l = J q.
 
-    The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers; q: (nv,)
-    rad or m, of a ball any numbers; targets: (nv,) rad or m: the target length of a servo is moved by |J| @ targets.
+    The controls are those of the keyframe, else the targets are the posture. posture: its name, or numbers;
+    q: (nv,) rad or m, of a ball any numbers; targets: (nv,) rad or m: the target length of a servo is moved
+    by |J| @ targets.
     """
     moved, n = np.broadcast_to(targets, len(q)), len(q)
     moments = [np.array(actuator.moment or (0.0,) * n) for actuator in drive.actuators]

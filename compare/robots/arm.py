@@ -71,12 +71,12 @@ CLAIMS = Claims(
 
 
 def landmarks(q: np.ndarray) -> list[Any]:
-    """Shoulder, elbow and finger tips, vectors in the world of numbers or arrays (times,), m, at angles q (times, 3), rad."""
+    """Shoulder, elbow and finger tips in the world, vectors of numbers or arrays (times,), at q (times, 3)."""
     return tmt.arm.points(list(q.T))
 
 
 def remarks(answers: Mapping[str, Any], dynamics: Mapping[str, Any]) -> list[Finding]:
-    """Errors in the printed solution. answers: by item, those of TMT (`.tmt`) and MuJoCo (`.mujoco`); dynamics: by engine."""
+    """Errors in the printed solution. answers: by item, of TMT and MuJoCo; dynamics: by engine."""
     q, qd = ARM.posture("ball catch"), np.ones(3)
     c, s = np.cos(q[1]), np.sin(q[1])
     stated = {

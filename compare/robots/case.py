@@ -31,9 +31,9 @@ Numbers = tuple[float, ...]
 class Robot:
     """A robot: a file for MuJoCo, the numbers that are compared with it, and scenes.
 
-    Tags of scenes: "full only": not in a quick run; "speed": every method is run; "regular": errors are regular from
-    large steps on; "falls": a free body falls and nothing else moves; "own": of a user or a file, only agreement is
-    expected.
+    Tags of scenes: "full only": not in a quick run; "speed": every method is run; "regular": errors are
+    regular from large steps on; "falls": a free body falls and nothing else moves; "own": of a user or a
+    file, only agreement is expected.
     """
 
     name: str
@@ -186,7 +186,7 @@ class Case:
             scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
 
     def counted(self, what: str, unit: str) -> str:
-        """How many numbers are accepted for the positions or the speeds of all joints, and their units, of a Kind."""
+        """How many numbers are accepted for the positions or speeds of all joints, and their units."""
         names: tuple[str, ...] = getattr(self.robot.coordinates, what)
         units = dict.fromkeys(unit.format(KINDS[kind]) for kind in self.robot.coordinates.all_kinds)
         return f"{len(names)} numbers, one per joint ({some_of(names)}), in {', '.join(units)}"

@@ -33,7 +33,8 @@ FREE = ("slide", "slide", "slide", "ball")
 class Coordinates(NamedTuple):
     """Positions q, nq numbers, and speeds, nv numbers, of a number of joints.
 
-    A hinge has an angle in rad, a slide a length in m, a ball a quaternion (w, x, y, z) and three speeds in its own axes.
+    A hinge has an angle in rad, a slide a length in m, a ball a quaternion (w, x, y, z) and three speeds in
+    its own axes.
     """
 
     names: tuple[str, ...]  # of the joints
@@ -134,7 +135,7 @@ class Coordinates(NamedTuple):
 
 
 def point_inertia(place: np.ndarray, mass: float = 1.0) -> np.ndarray:
-    """The inertia of a point mass, kg, at a place (3,), m, about the origin, (3, 3) kg m2: m (c'c 1 - c c')."""
+    """The inertia of a point mass, kg, at a place (3,) m, about the origin, (3, 3): m (c'c 1 - c c')."""
     return mass * (place @ place * np.eye(3) - np.outer(place, place))
 
 

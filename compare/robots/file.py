@@ -21,6 +21,7 @@ from .scene import Scene
 Array = np.ndarray
 DURATION = 1.0  # s; longer free motions are chaotic
 MIN_STEPS, MAX_STEPS_OF_A_FILE = 64, 8192  # of a scene, with its largest step
+MOST_ENTRIES = 1_400_000  # of all Jacobians of a run, which take the time where it is compared
 COARSER = 4  # largest step / step of the file
 OWN_POSTURES = "qpos0", "middle"  # their names
 SAME_POSTURE = 1e-9  # rad or m
@@ -68,18 +69,16 @@ def robot_of(file: RobotFile, shown: str) -> Robot:
 
 
 def robot_of_solution(file: RobotFile, shown: str, solution: RobotFile, whose: str) -> Robot:
-    """The robot of a file with the numbers, postures and scenes of a solution, called `whose`, with its joints' names."""
+    """The robot of a file with the numbers, postures, scenes and names of a solution, called `whose`."""
     robot = robot_of(solution, shown)
     mjcf, stated = file.path or robot.mjcf, solution.features
     return replace(robot, mjcf=mjcf, features=file.features, stated_in=whose, features_stated=stated)
 
 
 def not_compared(file: RobotFile, solution: RobotFile, names: Sequence[str]) -> list[Finding]:
-    """The limits and actuators that are not those of a solution, as they may be. names: its joints as in the file."""
-    ranges, called = (
-        dict(zip(file.tree.joint_names, file.ranges)),
-        dict(zip(solution.tree.joint_names, names)),
-    )
+    """The limits and actuators that are not those of a solution. names: its joints as in the file."""
+    ranges = dict(zip(file.tree.joint_names, file.ranges))
+    called = dict(zip(solution.tree.joint_names, names))
     limits = [name for name, limit in zip(names, solution.ranges) if rounded(ranges[name]) != rounded(limit)]
     laws, stated = laws_of(file.drive, {}), laws_of(solution.drive, called)
     actuators = [name for law, name in (laws | stated).items() if law not in laws or law not in stated]
@@ -112,7 +111,7 @@ def names_of_keys(file: RobotFile) -> dict[str, str]:
 
 
 def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tuple[float, ...]]:
-    """Postures by name, (nq,) each: keyframes, qpos0, the middle of the ranges; of equal postures only the first."""
+    """Postures by name, (nq,): keyframes, qpos0, the middle of the ranges; of equal ones only the first."""
     coordinates = Coordinates(file.tree.joint_names, file.tree.kind)
     middle = np.array(file.qpos0, dtype=float)
     for joint, limits in zip(coordinates.places.joints, file.ranges):
@@ -129,11 +128,11 @@ def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tupl
 
 
 def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive) -> tuple[Scene, ...]:
-    """The scenes of a robot: held, let go, let go with damping; a free body is thrown too; with servos see servo_scenes.
+    """The scenes of a robot: held, let go, with damping too; a free body is thrown; then servo_scenes.
 
-    Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial speed.
-    Methods are compared on a thrown free body, because one that is let go may only fall. start, q: the posture, name
-    and (nq,); dt: step of the file, s; drive: its actuators.
+    Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial
+    speed. Methods are compared on a thrown free body, because one that is let go may only fall. start, q: the
+    posture, name and (nq,); dt: step of the file, s; drive: its actuators.
     """
     coordinates, free = Coordinates(tree.joint_names, tree.kind), free_joints(tree)
     mass_matrix, weight = map(np.array, mass_matrix_and_bias(tree, q.tolist(), [0.0] * coordinates.nv))
@@ -167,7 +166,8 @@ def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive) -> tu
 def servo_scenes(tree: Tree, start: str, q: Array, dt: float, drive: Drive, inverse: Array) -> list[Scene]:
     """The scenes with the robot's own servos, if it has some: held, and step response.
 
-    A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods are not compared.
+    A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods
+    are not compared.
     """
     acting = controller(drive, start, np.array(q)[tree.coordinates.first_positions])
     if not acting.position_gain.any():
@@ -187,8 +187,8 @@ def servo_scenes(tree: Tree, start: str, q: Array, dt: float, drive: Drive, inve
 def added_damping(inverse: Array, accelerations: Array) -> tuple[float, ...]:
     """Damping of each speed, (nv,) N m s/rad or N s/m, with which a robot sinks without swinging.
 
-    Every joint, with its inertia 1 / (Mbar^-1)_ii, decays at the same rate: twice the frequency of a swing of 1 rad or 1 m with
-    the initial acceleration, at least 1 rad/s2.
+    Every joint, with its inertia 1 / (Mbar^-1)_ii, decays at the same rate: twice the frequency of a swing of
+    1 rad or 1 m with the initial acceleration, at least 1 rad/s2.
     """
     rate = 2.0 * np.sqrt(max(1.0, np.abs(accelerations).max()))
     return tuple(float(rate / ease) for ease in np.diag(inverse))
@@ -199,13 +199,19 @@ def coarsest(
 ) -> int:
     """The number of steps of a scene, 64, 128 ... 8192: about four times the step of the file.
 
-    No step is longer than 1 / the fastest rate of damping, added damping, springs and servos. inverse: of Mbar, (nv, nv).
+    No step is longer than 1 / the fastest rate of damping, added damping, springs and servos, unless that
+    were more steps than are afforded. inverse: of Mbar, (nv, nv).
     """
     least = duration * max(1.0 / (COARSER * dt), *fastest_rates(tree, inverse, added))
-    count = MIN_STEPS
-    while count < min(0.999 * least, MAX_STEPS_OF_A_FILE):
+    count, most = MIN_STEPS, min(MAX_STEPS_OF_A_FILE, steps_afforded(len(inverse)))
+    while count < 0.999 * least and 2 * count <= most:
         count *= 2
     return count
+
+
+def steps_afforded(nv: int) -> int:
+    """The steps of a run that is compared to its end: each has a Jacobian of (2 nv)^2 entries."""
+    return MOST_ENTRIES // (2 * nv) ** 2
 
 
 def thrown(tree: Tree) -> tuple[float, ...]:

@@ -1,9 +1,9 @@
-"""The joints of a user's equations: their order, sense, zero and units compared with those of the model; joints of two files.
+"""The joints of a user's equations: their order, sense, zero and units; joints of two files.
 
-A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg", "knee-0.1rad",
-"slider+0.2m", another zero (own position = position of the model + 90 deg); "knee in deg", positions in deg and speeds
-in deg/s; "knee in deg (rad/s)", positions only; and combinations: "-knee+90deg in deg". Mbar and h are always per rad
-and in N m.
+A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg",
+"knee-0.1rad", "slider+0.2m", another zero (own position = position of the model + 90 deg); "knee in deg",
+positions in deg and speeds in deg/s; "knee in deg (rad/s)", positions only; and combinations: "-knee+90deg in
+deg". Mbar and h are always per rad and in N m.
 """
 
 import re
@@ -19,7 +19,7 @@ from .coordinates import FREE, Coordinates, free_joints
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 NUMBER = r"[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-STATED = re.compile(rf"(?P<name>.+?)(?P<offset>{NUMBER})(?P<measure>deg|rad|m)")
+ZERO, UNIT = rf"(?:(?P<zero>{NUMBER})(?P<measure>deg|rad|m))", "(?: +in (?P<unit>.+))"
 FORMS = '"knee", "-knee", "knee+90deg" or "knee in deg"'
 
 
@@ -47,10 +47,10 @@ class Joint(NamedTuple):
 
 
 class JointMap:
-    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and a user's equations (`own`).
+    """Converts positions (..., nq), speeds (..., nv), Mbar and forces between a model and `own` equations.
 
-    q, v: the index in the model of each own position and speed. The others are factors of own positions (sign, of_q),
-    zeros, and factors of own speeds (sense, of_v).
+    q, v: the index in the model of each own position and speed. The others are factors of own positions
+    (sign, of_q), zeros, and factors of own speeds (sense, of_v).
     """
 
     def __init__(self, coordinates: Coordinates, joints: Sequence[Joint]) -> None:
@@ -75,7 +75,7 @@ class JointMap:
         return bool(in_order and (factors == 1.0).all() and not self.zero.any())
 
     def after(self, first: "JointMap", coordinates: Coordinates) -> "JointMap | None":
-        """The composition: first, then this map. None if it cannot be stated, for example degrees of degrees."""
+        """The composition: first, then this map. None if it cannot be stated, such as degrees of degrees."""
         inner_joints, joints = dict(zip(coordinates.names, first.joints)), []
         for stated in self.joints:
             inner = inner_joints[stated.name]
@@ -145,33 +145,29 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
     kinds = dict(zip(coordinates.names, coordinates.all_kinds))
     if text in kinds:
         return Joint(text)
-    units = [unit for unit in PER_UNIT if unit and text.endswith(f" in {unit}")]
-    unit = units[0] if units else ""
-    name, sign, zero = text.removesuffix(f" in {unit}").rstrip(), 1.0, 0.0
-    if name not in kinds and name.startswith("-"):
-        name, sign = name[1:], -1.0
-    if name not in kinds and (match := STATED.fullmatch(name)):
-        name, value, measure = match["name"], float(match["offset"]), match["measure"]
-        zero = float(np.radians(value)) if measure == "deg" else value
-        if name in kinds and (measure == "m") != (kinds[name] == "slide"):
-            raise JointsError(f"joint {text!r}: {name} is a {kinds[name]}, its zero cannot be in {measure}")
-    if name not in kinds:
-        before, _, measure = name.rpartition(" in ")
-        if before.removeprefix("-") in kinds:
-            known = ", ".join(filter(None, PER_UNIT))
-            raise JointsError(f"joint {text!r}: unknown unit {measure!r}; known: {known}")
+    names = "|".join(map(re.escape, sorted(kinds, key=len, reverse=True)))
+    match = re.fullmatch(f"(?P<sign>-?)(?P<name>{names}){ZERO}?{UNIT}?", text)
+    if match is None:
         raise JointsError(f"unknown joint {text!r}; known: {listed(coordinates.names)}, stated as {FORMS}")
-    if kinds[name] == "ball":
+    name, measure, unit = match["name"], match["measure"], match["unit"] or ""
+    kind, zero = kinds[name], float(match["zero"] or 0.0)
+    if unit not in PER_UNIT:
+        known = ", ".join(filter(None, PER_UNIT))
+        raise JointsError(f"joint {text!r}: unknown unit {unit!r}; known: {known}")
+    if measure and (measure == "m") != (kind == "slide"):
+        raise JointsError(f"joint {text!r}: {name} is a {kind}, its zero cannot be in {measure}")
+    if kind == "ball":
         raise JointsError(f"joint {text!r}: {name} is a ball, only its name can be stated")
-    if kinds[name] == "slide" and unit:
+    if kind == "slide" and unit:
         raise JointsError(f"joint {text!r}: {name} is a slide, its unit is m")
-    return Joint(name, sign, zero, unit, kinds[name] == "slide")
+    zero = float(np.radians(zero)) if measure == "deg" else zero
+    return Joint(name, -1.0 if match["sign"] else 1.0, zero, unit, kind == "slide")
 
 
 # joints of two files
 
 OTHER_TYPE = 1e6  # cost of joints of different kinds, which are never matched
-# cost of a match: 1 - |cos| of the axes, depth in the tree, distance / size of the robot, opposite axis, order (breaks ties)
+# cost of a match: 1 - |cos| of axes, depth, distance / size of the robot, opposite axis, order (breaks ties)
 OF_AXIS, OF_DEPTH, OF_PLACE, OF_SENSE, OF_ORDER = 4.0, 1.5, 1.0, 0.5, 1e-3
 
 
@@ -187,7 +183,7 @@ class Matched(NamedTuple):
 
 
 def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
-    """The joints of a tree for those of the reference, called `whose`: by name, else by place, axis and type. See Unmatched."""
+    """The joints of a tree for those of `whose` reference: by name, else by place, axis and type. Unmatched."""
     from scipy.optimize import linear_sum_assignment  # slow import
 
     pairs = same_names(reference.joint_names, tree.joint_names)

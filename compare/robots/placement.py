@@ -1,7 +1,7 @@
 """Where the frames of a file may lie without another motion: the stated robot, moved and turned with gravity.
 
-The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere; frames may be parallel at any position of
-the joints.
+The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere; frames may be parallel at any
+position of the joints.
 """
 
 from collections.abc import Iterator, Sequence
@@ -60,7 +60,7 @@ class Placement:
 
 
 def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
-    """The stated Tree, moved and turned such that most of its vectors are those of a file's Tree, with the same joints."""
+    """The stated Tree, moved and turned such that most of its vectors are those of a file's Tree."""
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
     reference = [tree.reference[joint] for joint in joints]
     drawn = tuple(name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b)
@@ -94,7 +94,7 @@ def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
 
 
 def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
-    """Vectors that turn with a robot, (k, 3): axes, distances of anchors and centres of mass of some joints; gravity last."""
+    """Vectors that turn with a robot, (k, 3): axes, distances of anchors, centres of mass; gravity last."""
     anchors, _, axes = (values[list(joints)] for values in places_of(tree))
     centres = np.zeros_like(anchors)
     for mass, joint, com in zip(tree.mass, tree.body_joint, tree.com):
@@ -119,7 +119,7 @@ def drawn_at(stated: tmt.Tree, reference: Sequence[float]) -> tmt.Tree:
 def with_frames(
     tree: tmt.Tree, anchors: np.ndarray, axes: np.ndarray, centres: np.ndarray, turns: np.ndarray, **more: Any
 ) -> tmt.Tree:
-    """A Tree with other anchors (n, 3), axes (nv, 3) and centres of mass (m, 3) in the world, and with turned tensors.
+    """A Tree with other anchors (n, 3), axes (nv, 3), centres of mass (m, 3) in the world, turned tensors.
 
     turns: (m, 3, 3), of each body; more: other fields of the Tree.
     """
@@ -151,7 +151,7 @@ def same_vectors(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def rotations(vectors: np.ndarray, others: np.ndarray) -> Iterator[np.ndarray]:
-    """Rotations by which two vectors that are not parallel become the others. The last vector is among those that are tried."""
+    """Rotations by which two vectors that are not parallel become the others. The last vector is tried."""
     tried = [*range(min(MOST_AXES, len(vectors) - 1)), len(vectors) - 1]
     for i, j in combinations(tried, 2):
         frame, other = frame_of(vectors[i], vectors[j]), frame_of(others[i], others[j])
@@ -160,7 +160,7 @@ def rotations(vectors: np.ndarray, others: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def frame_of(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
-    """Orthonormal axes, as columns, along the first vector and the plane of both; None where they are parallel."""
+    """Orthonormal axes, as columns, along the first vector and in the plane of both; None: parallel."""
     normal, lengths = np.cross(first, second), np.linalg.norm(first) * np.linalg.norm(second)
     if np.linalg.norm(normal) <= 1e-6 * lengths or lengths == 0.0:
         return None
@@ -169,7 +169,7 @@ def frame_of(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
 
 
 def directions(kind: str, axis: np.ndarray) -> np.ndarray:
-    """The projection, (3, 3), onto the directions in which the anchor of a joint may be moved without another motion."""
+    """The projection, (3, 3), onto directions in which an anchor may be moved without another motion."""
     if kind == "slide":
         return np.eye(3)
     return np.outer(axis, axis) if kind == "hinge" else np.zeros((3, 3))
@@ -178,7 +178,7 @@ def directions(kind: str, axis: np.ndarray) -> np.ndarray:
 def shifted(
     anchors: np.ndarray, others: np.ndarray, free: Sequence[np.ndarray], tolerance: float
 ) -> np.ndarray:
-    """The shift, (3,) m, with which most anchors, (n, 3), are the others apart from free directions; 0 unless more are then."""
+    """The shift, (3,) m, with which most anchors, (n, 3), are the others apart from free directions, or 0."""
 
     def count(shift: np.ndarray) -> int:
         apart = others - anchors - shift

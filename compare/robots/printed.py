@@ -1,4 +1,4 @@
-"""What is stated of a robot beside its Tree: what a published solution prints and claims, and features of a file."""
+"""What is stated of a robot beside its Tree: what a solution prints and claims, features of a file."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -5,28 +5,27 @@ from typing import Any
 
 import numpy as np
 
+from tmt.model.values import real_numbers, shown
+
 SEED = 10  # of every random number in a report
 MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
 TIMES = 1e-9, 1e6  # s, the shortest and the longest that is accepted
 TORQUES = ("free", "hold", "servos")
+NUMBERS = "posture", "torque", "speed", "damping", "targets", "duration", "dt", "judged"  # or names, or None
 
 
 class WrongField(ValueError):
     """A field of a scene has a wrong value. accepted: what is expected instead."""
 
     def __init__(self, scene: object, field: str, value: object, accepted: str):
-        named, shown = (shorten(" ".join(repr(part).split())) for part in (scene, value))
-        super().__init__(f"scene {named}: {field} is {shown}; expected {accepted}")
+        super().__init__(f"scene {shown(scene)}: {field} is {shown(value)}; expected {accepted}")
         self.field, self.value, self.accepted = field, value, accepted
 
 
 def is_number(value: object) -> bool:
     """Whether a value is a finite real number; texts and booleans are not."""
-    try:
-        number = np.asarray(value)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return number.ndim == 0 and number.dtype.kind in "iuf" and bool(np.isfinite(number))
+    number = real_numbers(value)
+    return number is not None and number.ndim == 0 and bool(np.isfinite(number))
 
 
 def are_numbers(values: Any) -> bool:
@@ -40,16 +39,12 @@ def is_each(value: Any) -> bool:
     return is_number(value) or (are_numbers(value) and np.size(value) > 0)
 
 
-def shorten(text: str, length: int = 60) -> str:
-    return text if len(text) <= length else text[: length - 4] + " ..."
-
-
 @dataclass(frozen=True)
 class Scene:
     """A motion of any robot under constant torque, or under constant controls of its actuators.
 
-    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute values
-    that would hide those of the file. Raises WrongField for values that no robot can have.
+    It states changes of the model ("no gravity", "additional damping", "these joints locked"), never absolute
+    values that would hide those of the file. Raises WrongField for values that no robot can have.
     """
 
     name: str
@@ -70,16 +65,16 @@ class Scene:
         is_name = isinstance(self.name, str) and bool(self.name.strip()) and self.name.isprintable()
         self.require("name", is_name, "a text in one line, not empty")
         is_posture = isinstance(self.posture, str) or are_numbers(self.posture)
-        self.set("posture", is_posture, "the name of a posture, or numbers")
+        self.require("posture", is_posture, "the name of a posture, or numbers")
         is_torque = self.torque in TORQUES if isinstance(self.torque, str) else are_numbers(self.torque)
-        self.set("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
-        self.set("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
+        self.require("torque", is_torque, "free, hold, servos, or a torque in N m for each joint")
+        self.require("speed", are_numbers(self.speed), "a speed in deg/s for each joint")
         for name in ("duration", "dt"):
             is_time = is_number(getattr(self, name)) and TIMES[0] <= getattr(self, name) <= TIMES[1]
-            self.set(name, is_time, f"a time from {TIMES[0]:g} to {TIMES[1]:g} s")
+            self.require(name, is_time, f"a time from {TIMES[0]:g} to {TIMES[1]:g} s")
         accepted = "a number of at least 0 N m s/rad, or one for each joint"
-        self.set("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
-        self.set("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
+        self.require("damping", is_each(self.damping) and np.min(self.damping) >= 0.0, accepted)
+        self.require("targets", is_each(self.targets), "a movement in deg (m), of all joints or each")
         self.require("targets", not np.any(self.targets) or self.torque == "servos", 'torque = "servos"')
         self.require("gravity", isinstance(self.gravity, bool | np.bool_), "true or false")
         object.__setattr__(self, "gravity", bool(self.gravity))
@@ -88,7 +83,12 @@ class Scene:
         self.require("dt", divides and self.duration / self.dt <= MAX_STEPS, accepted)
         if self.judged is not None:
             is_time = is_number(self.judged) and 0.0 <= self.judged <= self.duration
-            self.set("judged", is_time, f"a time in s of at most {self.duration:g}")
+            self.require("judged", is_time, f"a time in s of at most {self.duration:g}")
+        for name in NUMBERS:
+            value = getattr(self, name)
+            if not isinstance(value, str | None):
+                number = tuple(map(float, value)) if np.ndim(value) else float(value)
+                object.__setattr__(self, name, number)
         for name in ("locked", "tags"):
             value = getattr(self, name)
             is_names = isinstance(value, tuple | list) and all(isinstance(part, str) for part in value)
@@ -99,13 +99,6 @@ class Scene:
         """Raise WrongField for a field unless it is right."""
         if not is_right:
             raise WrongField(self.name, name, getattr(self, name), accepted)
-
-    def set(self, name: str, is_right: bool, accepted: str) -> None:
-        """Require that a field is right, and store its numbers as floats."""
-        self.require(name, is_right, accepted)
-        value = getattr(self, name)
-        if not isinstance(value, str):
-            object.__setattr__(self, name, tuple(map(float, value)) if np.ndim(value) else float(value))
 
     @property
     def steps(self) -> int:

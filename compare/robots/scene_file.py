@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from .case import Case, Robot
-from .scene import Scene, WrongField, are_numbers, is_number, shorten
+from .scene import Scene, WrongField, are_numbers, is_number
 
 KEYS = (
     "name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt"
 )  # fmt: skip
 STEPS = 64  # of a scene without dt
+LONGEST = 56  # text of a value in a message
 NEARLY_ONE = 1e-3  # accepted deviation of the length of a quaternion from 1, for few digits
 
 
@@ -26,8 +27,9 @@ class SceneError(ValueError):
 def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     """The scenes of a file for a robot; a scene needs a name, all else has the defaults of a Scene.
 
-    Units: deg, deg/s, N m, N m s/rad, s; of slides m, m/s, N. A ball has a quaternion w, x, y, z, which is normalized,
-    and three speeds and torques. SceneError: the file cannot be read; unknown key, wrong value, repeated name.
+    Units: deg, deg/s, N m, N m s/rad, s; of slides m, m/s, N. A ball has a quaternion w, x, y, z, which is
+    normalized, and three speeds and torques. SceneError: the file cannot be read; unknown key, wrong value,
+    repeated name.
     """
     scenes: list[Scene] = []
     names = {scene.name: f"a scene of {robot.name}" for scene in robot.scenes}
@@ -50,7 +52,7 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
 
 
 def read_controls(path: str | Path, actuators: Sequence[str]) -> dict[str, np.ndarray]:
-    """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators. SceneError, in one line."""
+    """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators. SceneError."""
     try:
         with open(path, encoding="utf-8", newline="") as file:
             names, *lines = [line for line in csv.reader(file) if line]
@@ -76,13 +78,10 @@ def entries_of(path: str | Path) -> list[dict[str, Any]]:
     if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
         raise SceneError(f"{path} is not a regular file; expected a TOML file")
     try:
-        content = tomllib.loads(Path(path).read_bytes().decode())
-    except OSError as error:
-        raise SceneError(f"cannot read {path}: {error.strerror}; expected a TOML file") from None
-    except RecursionError:
-        raise SceneError(f"{path} is nested too deep; expected tables [[scene]]") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"{path} is not TOML: {' '.join(str(error).split())}") from None
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:  # TOML's and Unicode's errors are ValueErrors
+        why = "it is nested too deep" if isinstance(error, RecursionError) else " ".join(str(error).split())
+        raise SceneError(f"{path} is not a TOML file that can be read: {why}") from None
     if others := content.keys() - {"scene"}:
         raise SceneError(f"{path}: {min(others)} is unknown; expected tables [[scene]]")
     entries = content.get("scene")
@@ -115,7 +114,7 @@ def scene_of(entry: dict[str, Any], robot: Robot) -> Scene:
 
 
 def with_unit_quaternions(name: object, q: Any, robot: Robot) -> Any:
-    """A position with normalized quaternions; WrongField if the length of one is not nearly 1, or for a text."""
+    """A position with normalized quaternions; WrongField where a length is not nearly 1, or for a text."""
     if isinstance(q, str):
         raise WrongField(name, "posture", q, f"{robot.coordinates.nq} numbers, one per joint")
     if not are_numbers(q) or len(q) != robot.coordinates.nq:
@@ -131,5 +130,6 @@ def with_unit_quaternions(name: object, q: Any, robot: Robot) -> Any:
 
 
 def shown(value: object) -> str:
-    """A value in one line, shortened."""
-    return shorten(json.dumps(value, ensure_ascii=False, default=str))
+    """A value in one line, as TOML has it, shortened."""
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."

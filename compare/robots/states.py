@@ -21,7 +21,7 @@ MOST_NUMBERS = 2_000_000  # maximum size of T_b of all random states
 
 @dataclass(eq=False)
 class Sample:
-    """States q (states, nq) rad, qd rad/s and tau N m (states, nv), with exact values for the first `exact_states`."""
+    """States q (states, nq) rad, qd rad/s, tau N m (states, nv), exact values for the first `exact_states`."""
 
     tree: tmt.Tree
     name: str
@@ -71,7 +71,7 @@ def named(robot: Robot) -> Sample:
 
 
 def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sample:
-    """Random states: positions within the ranges of the joints; see `largest_speeds_and_torques`. Large robots have fewer."""
+    """Random states within the ranges, see `largest_speeds_and_torques`; large robots have fewer."""
     rng, wanted, nv = np.random.default_rng(seed), states, robot.coordinates.nv
     states = min(wanted, max(1, MOST_NUMBERS // (3 * len(robot.tree.mass) * nv)))
     notes = []
@@ -89,15 +89,15 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
 
 
 def seconds(robot: Robot) -> float:
-    """Duration of all quantities of a state with 50 digits, s; measured for 3 to 35 speeds, within a third."""
+    """Duration of all quantities of a state with 50 digits, s; measured for 3 to 35 speeds, +-1/3."""
     return 3e-3 + 3.4e-5 * robot.coordinates.nv**2 * len(robot.tree.mass)
 
 
 def largest_speeds_and_torques(robot: Robot) -> np.ndarray:
     """The largest random speeds, rad/s, and torques, N m, (2, nv): 10 each for a robot without ranges.
 
-    Else a speed passes the range of its joint in 1 s (a turn, 1 m without range), and a torque gives the joint 10 rad/s2 at
-    q = 0 if the others are locked.
+    Else a speed passes the range of its joint in 1 s (a turn, 1 m without range), and a torque gives the
+    joint 10 rad/s2 at q = 0 if the others are locked.
     """
     if not robot.ranges:
         return np.full((2, robot.coordinates.nv), 10.0)

@@ -19,10 +19,10 @@ UPWARD = np.array([-np.sin(_E) * np.cos(_A), -np.sin(_E) * np.sin(_A), np.cos(_E
 
 
 def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np.ndarray, Sticks]:
-    """Points in the world, (times, points, 3) m, at positions q (times, nq), and the pairs of points with a stick.
+    """Points in the world, (times, points, 3) m, at q (times, nq), and the pairs of points with a stick.
 
-    The landmarks; else the joints, and the centres of mass after the last joints; the slides of a free joint are left out.
-    crosses: with the axes of balls at the end of a chain, to show their rotation.
+    The landmarks; else the joints, and the centres of mass after the last joints; the slides of a free joint
+    are left out. crosses: with the axes of balls at the end of a chain, to show their rotation.
     """
     if robot.landmarks:
         landmarks = [along_run(point, q) for point in robot.landmarks(q)]

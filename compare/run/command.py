@@ -82,7 +82,7 @@ def compute(
         for name, reason in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=reason))
         terminal.how_far = partial(examine.progress, workers.clock, names)
-        examined = examine.examine(names, setup, folder, terminal, workers, workers.clock)
+        examined = examine.Run(names, setup, folder, terminal, workers, workers.clock).examined()
     origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
     return write_report(folder, examined, reasons, origin, compared)
 

@@ -15,7 +15,7 @@ from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
-from ..process.workers import Clock, WorkerEnded, load_modules
+from ..process.workers import Clock, WorkerEnded, Workers, load_modules
 from ..report.terminal import Terminal
 from ..report.verdict import Figure, Section, failures
 from ..robots import Robot
@@ -49,17 +49,12 @@ def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **mo
 
 
 def not_chosen(chosen: str) -> set[str]:
-    """The engines that read files and are not chosen, by names with commas. Refused: a name is none of these."""
+    """The engines that read files and are not chosen, by names. Refused: a name is none of these."""
     known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
     for name in names:
         if name not in (*ALWAYS, *known):
             raise Refused(block("run", "no_engine", name=name, known=known))
     return {*known} - {*names}
-
-
-def examine(names: Sequence[str], setup: Setup, *place: Any) -> Examined:
-    """The experiments of a run, see Run, one after the other."""
-    return Run(names, setup, *place).examined()
 
 
 @dataclass
@@ -74,7 +69,7 @@ class Run:
     setup: Setup
     folder: Path  # for the folder of figures
     terminal: Terminal
-    workers: Executor
+    workers: Executor | Workers
     clock: Clock = field(default_factory=Clock)
     sections: list[Section] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)
@@ -90,6 +85,7 @@ class Run:
         self.early = () if is_large else [name for name in self.order if not self.too_long(name)]
 
     def examined(self) -> Examined:
+        """The experiments, one after the other."""
         (self.folder / "figures").mkdir()
         for name in self.early:
             if begin := functions(name).begin:
@@ -147,14 +143,16 @@ class Run:
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
         say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))
-        for text in section.result.top if len(self.names) > 1 else ():  # else it is the last line of the run
-            self.terminal.say(f"  {say(text)}")
+        if len(self.names) > 1:  # else they are the last lines of the run
+            for text in section.result.top:
+                self.terminal.say(f"  {say(text)}")
 
     def section_of(self, name: str) -> Section:
         """The section of an experiment, which is run for it; of one that raises with the error alone."""
         rows, work = functions(name).rows, [self.work[name]] if name in self.work else []
         result = None if name in self.crashed else self.attempt(name, rows, self.setup, *work)
-        section = self.attempt(name, section_with, name, result, self.setup.robot) if result else None
+        about = name, result, self.setup.robot, len(self.names) == 1
+        section = self.attempt(name, section_with, *about) if result else None
         return section or Section(name, name, "", "", self.crashed[name])
 
     def draw(self, section: Section) -> None:
@@ -184,12 +182,17 @@ class Run:
         self.clock.ends(END)
 
 
-def section_with(name: str, result: Result, robot: Robot) -> Section:
+def section_with(name: str, result: Result, robot: Robot, is_alone: bool = False) -> Section:
+    """The section of an experiment; of a run of several the first screen has the answers alone."""
     experiment = functions(name)
+    title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
     result.headline = result.headline or experiment.headline(result)
+    if not is_alone:
+        top = [text for text in result.top if text.kind in record.first_screen]
+        result.notes = [text for text in result.top if text not in top] + result.notes
+        result.top = top
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
     claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
-    title, record = block(name, "title", robot=robot), EXPERIMENTS[name]
     return Section(name, title, claim, tolerance, result, record=record)
 
 

@@ -85,10 +85,8 @@ def what_follows(setup: Setup) -> dict[str, bool]:
     found = diagnosis.diagnosed(setup)
     equations = found.ratio <= 1.0 or bool(found.diagnosis.causes)
     motion = equations
-    if (
-        motion and not found.of_forces and given.has("acceleration") and given.has("bias")
-    ):  # it has asked at a few states
-        motion = diagnosis.is_solved(given, setup.robot.tree, setup.random)
+    if motion and not found.of_forces and given.has("acceleration") and given.has("bias"):
+        motion = diagnosis.is_solved(given, setup.robot.tree, setup.random)  # it has asked at a few states
     follows = dict.fromkeys(("equations", "gravity", "energy"), equations)
     follows |= {"geometry": False, "motion": motion}
     sample = setup.random.first(found.states)

@@ -95,6 +95,10 @@ class Compared(NamedTuple):
             name = integrator_by_name(integrator or self.reading.integrator)
             if asked["posture"]:
                 posture_of(asked["posture"], self.reading)
+            if asked["points"]:
+                from ..engines.mujoco.smaller import spec_with_points  # imports are slow
+
+                spec_with_points(self.reading.source, asked["points"].split(","))
         except ValueError as error:
             raise ModelError(f"{' '.join(given)}: {error}") from None
         period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
@@ -103,10 +107,10 @@ class Compared(NamedTuple):
         if asked["controls"]:
             names = [actuator.name for actuator in self.reading.drive.actuators]
             asked["controls"] = read_controls(asked["controls"], names)
-        if asked["write"] and not Path(asked["write"]).absolute().parent.is_dir():
-            raise ModelError(f"cannot write {asked['write']}: there is no such folder")
-        if asked["write"] and Path(asked["write"]).resolve() == Path(str(self.reading.source)).resolve():
-            raise ModelError(f"cannot write {asked['write']}: it is the file of the robot itself")
+            if options.scenes:
+                raise ModelError("--controls and --scenes both say what the robot does")
+        if asked["write"] and (why := not_writable(Path(asked["write"]), str(self.reading.source))):
+            raise ModelError(f"cannot write {asked['write']}: {why}")
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 
@@ -115,7 +119,7 @@ def compared_with(
     reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None,
     floating: bool = False,
 ) -> Compared:  # fmt: skip
-    """A file (None: the arm's) and a reference (None: the arm, if the file has its hinges, else the compiled model).
+    """A file (None: the arm's) and a reference (None: the arm for a file with its hinges, else model).
 
     joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
     solution: the path of the solution, if not `reference`; floating: the base of a URDF has a free joint.
@@ -151,6 +155,15 @@ def compared_with(
     return Compared(of_file._replace(kind="own", own=own), robot, mujoco, reading)
 
 
+def not_writable(path: Path, robot: str) -> str:
+    """Why a smaller file cannot be written there, "" if it can. robot: the path of its file."""
+    if path.is_dir():
+        return "it is a folder"
+    if not path.absolute().parent.is_dir():
+        return "there is no such folder"
+    return "it is the file of the robot itself" if path.resolve() == Path(robot).resolve() else ""
+
+
 def with_arm(source: Source, path: Text, shown: str) -> Compared:
     """A file (None: the arm's) and the arm's numbers, placed as in the file, whose welded bodies are one."""
     if path is None:
@@ -176,7 +189,7 @@ def is_solution(reference: str | None) -> bool:
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:
-    """The file's joints in the order of the stated ones; those of other names. JointsDiffer if any is left."""
+    """The file's joints in the order of the stated ones, and those renamed. JointsDiffer if any is left."""
     try:
         return matched_joints(stated.tree, reading.tree, whose)
     except Unmatched as error:

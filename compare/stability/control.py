@@ -113,16 +113,17 @@ def controlled(
         Step(model if kp is None else with_servos(model, kp, kv or 0.0, targets), dt, integrator), state
     )
     held = Step(motors, dt, integrator)
-    commands = held.commands(servos, settled.state)
-    held.put(settled.state)
     places = [servo.control for servo in servos]
-    held.data.ctrl[places] = commands
+    held.put(settled.state)
+    held.data.ctrl[places] = held.commands(servos)
     start = held.state()
     rest = Rest.at(held, start)
-    columns = [
-        held.commands(servos, start, by) - held.commands(servos, start, -by)
-        for by in NUDGE * np.eye(held.size)
-    ]
+    columns = []
+    for by in NUDGE * np.eye(held.size):
+        held.put(start, by)
+        ahead = held.commands(servos)
+        held.put(start, -by)
+        columns.append(ahead - held.commands(servos))
     if not np.abs(columns).max() > 0.0:  # what they read does not depend on the state
         return None
     return Controlled(

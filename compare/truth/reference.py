@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt.exact.motion import TooManySteps, truth
+from tmt.exact.motion import Path, TooManySteps, truth
 from tmt.methods import METHODS
 
 from ..core.finding import Finding
@@ -18,7 +18,9 @@ from ..robots import Robot
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates, rates_at
 from ..stability.held import growth_of, is_runge_kutta
+from .kept import kept
 
+State = tuple[float, ...]
 RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
 DOUBLES = "dopri8"  # the method of a run in doubles
@@ -59,7 +61,18 @@ def reference(case: Case) -> Reference:
     return Reference(times(case), path.high, path.low, apart, path.steps, case.coordinates)
 
 
-in_pairs = lru_cache(maxsize=64)(truth)  # several experiments need the same
+@lru_cache(maxsize=64)  # several experiments need the same
+def in_pairs(
+    tree: tmt.Tree, q: State, v: State, tau: State, dt: float, steps: int, every: int
+) -> tuple[Path, float]:
+    """`truth` of a motion, computed once and kept."""
+
+    def computed() -> list[np.ndarray]:
+        path, apart = truth(tree, q, v, tau, dt, steps, every)
+        return [*map(np.array, (*path, apart))]
+
+    high, low, count, apart = kept(computed, tree, "pairs", (q, v, tau, dt, steps, every))
+    return Path(high, low, int(count)), float(apart)
 
 
 def first_steps(case: Case) -> int:

@@ -2,15 +2,14 @@
 
 from dataclasses import replace
 
+import faults
 import numpy as np
 import pytest
 
 import tmt
-from compare.core.text import apart
 from compare.diagnosis import Values, diagnose
 from compare.diagnosis.model import packed
 from compare.diagnosis.places import OF_ZERO, Place
-from compare.judge.scale import EPS
 
 
 def states(tree=tmt.ARM, seed=0, count=16):
@@ -95,16 +94,6 @@ def test_a_cause_is_named_with_its_value_and_its_rank(given, rank, place, explai
     assert cause.left_over < 1e-11
 
 
-def test_angles_to_the_world_are_an_option_of_parallel_hinges():
-    """The turn of the last hinge, whose axis is opposite, enters with the other sign."""
-    axis = ((0.0, 1.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0))
-    row = replace(ARM, axis=axis, offset=((0.0, 0.0, 0.0), (0.2, 0.0, -0.1), (0.0, 0.0, -0.3)))
-    turns = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])  # joint angles from angles
-    M, h = tmt.mass_matrix(Q @ turns.T, row), tmt.bias(Q @ turns.T, QD @ turns.T, row)
-    given = Values.of(row, Q, QD, turns.T @ M @ turns, h @ turns, rounding=640.0 * EPS)
-    assert "angle of beta and gamma" in {cause.place for cause in diagnose(row, given).causes}
-
-
 def test_what_nothing_explains_names_the_entries():
     given = added(1, np.sin(3.0 * Q[:, 0]))
     given[:, 8] += np.cos(5.0 * Q[:, 1]) * QD[:, 2] ** 3
@@ -113,13 +102,12 @@ def test_what_nothing_explains_names_the_entries():
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
-def test_only_what_is_given_is_compared():
-    found = diagnosis(packed(tmt.mass_matrix(Q, HEAVY), np.full_like(Q, np.nan)))
-    assert "mass of forearm" in {cause.place for cause in found.causes} and found.compared == 6
-
-
-def test_what_no_body_can_have_is_not_offered():
-    assert not any("armature of gamma" in cause.place for cause in diagnosis(added(5, -0.1)).causes)
+def test_a_robot_of_slides_alone_has_no_sine_that_is_wrong():
+    """A number that nobody writes: causes that are likelier are sought, among them sines."""
+    slides = replace(ARM, kind=("slide",) * 3)
+    M = tmt.mass_matrix(Q, slides) + np.diag([0.1234567891, 0.0, 0.0])
+    found = diagnose(slides, Values.of(slides, Q, QD, M, None))
+    assert "armature of alpha" in {cause.place for cause in found.causes}
 
 
 def test_without_time_options_are_still_sought():
@@ -194,19 +182,6 @@ def test_the_nearest_cause_is_told_if_it_leaves_less_than_half(size, is_near):
     assert closest.left_over < 0.5 if is_near else closest is None
 
 
-def test_the_matrix_of_velocity_terms_transposed_is_the_gradient_of_the_kinetic_energy():
-    """Of Christoffel's C and a constant M but for cos(knee): C' qd has one entry, - sin(knee) (hip'^2 + hip' knee') / 2."""
-    moving = lambda q, qd: -np.sin(q[:, 1:]) * (qd[:, :1] ** 2 + qd[:, :1] * qd[:, 1:]) / 2.0 * [0, 1]  # noqa: E731
-    causes = told({}, lambda q, qd: tmt.gravity_balance(q, TREE) + moving(q, qd)).causes
-    assert (causes[0].place, causes[0].explains) == ("C(q, qd) in h", "transposed, C' qd for C qd")
-
-
-def test_an_added_product_of_speeds_is_named():
-    found = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + 0.02 * qd[:, :1] * qd[:, 1:] * [0, 1]).causes[0]
-    assert (found.place, found.stated) == ("h[knee], coefficient of hip' knee'", 0.0)
-    assert found.explains == pytest.approx(0.02)
-
-
 def test_a_coefficient_that_nothing_explains_is_told_with_both_numbers():
     more = lambda q, qd: 0.2 * np.exp(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]  # noqa: E731
     found = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + more(q, qd))
@@ -216,29 +191,10 @@ def test_a_coefficient_that_nothing_explains_is_told_with_both_numbers():
     assert f"{detail.yours:g}" in found.sentence()
 
 
-def test_a_coefficient_comes_before_the_derivative_of_M_that_does_the_same():
-    """dM[hip][knee]/d knee with the other sign: only the term of knee'^2 in h[hip] has it."""
-    causes = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + np.sin(q[:, 1:]) * qd[:, 1:] ** 2 * [1, 0]).causes
-    assert causes[0].place == "h[hip], coefficient of knee'^2" and causes[0].explains == pytest.approx(-1.0)
-    assert "dM[knee][hip]/d knee in h" in [cause.place for cause in causes]
-
-
 def test_the_arguments_of_bias_exchanged():
     assert not told({}).differs
     (cause,) = told({}, lambda q, qd: tmt.bias(qd, q, TREE)).causes
     assert (cause.place, cause.explains) == ("arguments of bias", "exchanged, bias(qd, q)")
-
-
-def test_a_parallel_axis_term_left_out():
-    """Of the arm's Mbar, but not of its h."""
-    q, _ = states(tmt.ARM)
-    com, turns = np.array(tmt.ARM.com), tmt.jacobians(q)[1]
-    moved = np.einsum("bi,bi->b", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None]
-    given = values()
-    of_bodies = np.einsum("b,sbci,bcd,sbdj->sij", np.array(tmt.ARM.mass), turns, moved, turns)
-    given[:, :6] -= packed(of_bodies, q)[:, :6]
-    (cause,) = diagnosis(given).causes
-    assert cause.place == "parallel-axis term m (c'c 1 - c c') of every body left out in M alone"
 
 
 @pytest.mark.parametrize("size", [1e-12, np.inf])
@@ -249,12 +205,6 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     assert size < 1.0 or len(found.entries) == 5
 
 
-def test_two_numbers_that_differ_are_not_printed_as_one():
-    for pair in ((3.55812, 3.55812 * (1 + 1e-9)), (1.0, 1.0 + EPS), (0.1, 0.2), (0.0, 1e-20)):
-        texts = apart(*pair), apart(*pair[::-1])
-        assert texts[0] != texts[1] and [float(text) for text in texts] == pytest.approx(pair, rel=1e-5)
-
-
 @pytest.mark.parametrize("change, read, meant", [
     (90.0 - np.pi / 2.0 - 28.0 * np.pi, 90.0, np.pi / 2.0), (1.5707963 * (np.pi / 180.0 - 1.0), np.pi**2 / 360.0, np.pi / 2.0),
 ])  # fmt: skip
@@ -263,7 +213,8 @@ def test_a_zero_that_is_read_in_another_unit_is_its_angle(change, read, meant):
     assert (cause.kind, cause.explains, cause.stated) == ("number", pytest.approx(read), pytest.approx(meant))
 
 
-@pytest.mark.parametrize("unit, explains", [("rad", 0.5 - np.pi / 2), ("m", 0.5 + 1.5 * np.pi)])
-def test_the_zero_of_a_hinge_is_at_most_half_a_turn_from_the_stated_one(unit, explains):
-    place = Place(OF_ZERO, "zero of knee", 0.5, unit, 1.0)
-    assert place.cause(1.5 * np.pi).explains == pytest.approx(explains)
+@pytest.mark.slow
+def test_no_fault_is_explained_by_something_else():
+    """Of a sample of those of `python -m tests.faults`."""
+    outcomes = [faults.outcome(fault)[0] for fault in faults.all_faults()[::23]]
+    assert "wrong" not in outcomes and sum(of in ("named", "tied") for of in outcomes) >= 0.75 * len(outcomes)

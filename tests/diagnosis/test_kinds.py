@@ -78,20 +78,6 @@ def test_a_convention_is_named(tree, place):
     assert np.allclose(there[1] + there[2], inner.h + drift[:, :0].sum())
 
 
-def test_the_axes_of_velocities_are_those_of_the_kinetic_energy():
-    """v' M v is the same in every convention, and so is the power of gravity."""
-    equations = Equations(STONE, *states(STONE))
-    speeds = np.random.default_rng(5).normal(size=equations.qd.shape)
-    for convention in all_conventions(equations):
-        if convention.cause.kind == "axes":
-            inner = Equations(STONE, convention.q, convention.qd).parts
-            M, _, rest = convention.applied(*inner)
-            v = np.einsum("sij,sj->si", convention.S, speeds)
-            kinetic = (np.einsum("si,sij,sj->s", u, mass, u) for u, mass in ((speeds, M), (v, inner[0])))
-            assert np.allclose(*kinetic)
-            assert np.allclose((rest * speeds).sum(axis=1), (inner[2] * v).sum(axis=1))
-
-
 def test_a_body_with_its_linear_velocity_in_its_own_axes_has_omega_x_v():
     """m (vdot + omega x v) of a point at the CoM: the drift of the convention."""
     point = replace(STONE, com=((0.0, 0.0, 0.0),), gravity=(0.0, 0.0, 0.0))
@@ -231,26 +217,6 @@ def test_a_cause_in_parts_of_the_equations_alone():
     heavy = parts(replace(ARM, mass=(2.0, 1.5)))
     two = of_parts(ARM, other[0], other[1], heavy[2]).causes[0]
     assert two.place == "mass of upper arm in gravity alone and CoM x of forearm, but not in gravity"
-
-
-def test_h_by_the_derivatives_of_a_wrong_mass_matrix_is_the_same_cause():
-    short = replace(ARM, com=(ARM.com[0], (0.1, 0.0, 0.0)))
-    (M, velocity_terms, _), (*_, rest) = parts(short), parts(ARM)
-    found = of_parts(ARM, M, velocity_terms, rest, mass_matrix=lambda q: tmt.mass_matrix(q, short))
-    assert first(found) == ("CoM x of forearm, but not in gravity", pytest.approx(0.1))
-
-
-def test_a_slip_beside_a_number():
-    tensor = np.diag(np.diag(TENSOR)[[2, 1, 0]]).tolist()
-    other = replace(ARM, mass=(1.8, 1.5), inertia=(ARM.inertia[0], tensor))
-    place, mass = first(of_parts(ARM, *parts(other)))
-    assert (place, mass) == ("inertia of forearm, axes x and z exchanged and mass of upper arm", "1.8")
-
-
-def test_a_length_in_mm_is_judged_on_its_own_scale():
-    tree = replace(ARM, offset=(*ARM.offset[:2], (0.0, 0.0, -300.0)))
-    place, explains = first(of_parts(ARM, *parts(tree)))
-    assert (place, explains) == ("offset z of gamma", pytest.approx(-300.0, rel=1e-9))
 
 
 def test_the_likelier_of_two_causes_comes_first():

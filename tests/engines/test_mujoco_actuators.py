@@ -10,7 +10,6 @@ from models import PATHS
 import tmt
 from compare.engines.mujoco import read
 from compare.engines.mujoco.step import Step, start_of
-from compare.engines.mujoco.variants import add_armature
 from compare.engines.tmt import Tmt
 
 SITES = TWO.replace("<geom", '<site name="s" pos="0.1 0 0"/><geom', 1)
@@ -98,16 +97,6 @@ def mass_matrix(model):
     mujoco.mj_forward(model, data)
     mujoco.mj_fullM(model, data, full)
     return full
-
-
-def test_armature_is_added_to_bodies_whose_inertia_never_changes():
-    """A free body, a slide and a wheel: their inertia is stored."""
-    free = '<body><freejoint/><geom size="0.1"/></body>'
-    reading = read(mjcf(free + '<body><joint type="slide"/><geom size="0.1"/></body>' + TWO))
-    heavy = mujoco.MjModel.__copy__(reading.model)
-    add_armature(heavy, np.full(heavy.nv, 2.0))
-    added = mass_matrix(heavy) - mass_matrix(reading.model)
-    assert added == pytest.approx(2.0 * np.eye(heavy.nv), abs=1e-12)
 
 
 def test_an_actuator_after_one_with_several_outputs_has_its_own_gear():

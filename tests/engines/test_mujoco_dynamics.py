@@ -10,7 +10,6 @@ from trees import random_states
 
 import tmt
 from compare.engines.mujoco import calls, engine, parse, read
-from compare.engines.mujoco.calls import MinimalCalls
 from compare.engines.mujoco.differences import left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
@@ -28,17 +27,6 @@ def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypa
     assert lenient.ended == strict.ended and list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("place, value, last", [((2, 0), 0.2, 2), ((1, 5), np.inf, 1)])
-def test_a_run_is_no_number_from_where_its_clock_stands_or_a_number_is_not_finite(mujoco, place, value, last):
-    dynamics, states, start = mujoco.of(ARM.case()), np.ones((1, 4, 7)), np.zeros((1, 7))
-    states[0, :, 0] = [0.1, 0.2, 0.3, 0.4]
-    states[0][place] = value
-    q, v, ended = dynamics.path(start, states, 0.1)
-    for values in (q, v):
-        assert np.isfinite(values[0]).all(axis=1).tolist() == [k <= last for k in range(5)]
-    assert ended[0].startswith(f"at t = {0.1 * last:g} s: ")
-
-
 def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):
     """And so are what MuJoCo says of its own steps, and the numbers that it compiled."""
     robot = crane(tmp_path)
@@ -54,25 +42,19 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
         assert np.allclose(compiled[name], stated[name], atol=1e-14), name
 
 
-@pytest.mark.skipif(MinimalCalls.unavailable() is not None, reason="MuJoCo's library is elsewhere")
-def test_a_loop_repeats_its_calls_at_the_current_state(mujoco, rng):
+@pytest.mark.skipif(calls.library() is None, reason="MuJoCo's library is elsewhere")
+def test_a_loop_repeats_its_calls_at_a_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
-    minimal = MinimalCalls(dynamics)
-    loops = minimal.loops(*rng.uniform(-2.0, 2.0, (3, 3)))
-    equal_work = loops["MuJoCo, equal work"]
     for q, v in rng.uniform(-2.0, 2.0, (2, 2, 3)):
-        minimal.place(q, v, nothing)
-        minimal.force[:] = np.nan
-        equal_work(0)
-        assert np.isnan(minimal.force).all()
-        equal_work(1)
-        M, full = dynamics.mass_matrix(q), np.zeros((3, 3))
-        calls.mujoco.mj_fullM(minimal.model, minimal.data, full)
-        assert np.array_equal(full, M) and np.array_equal(minimal.force, dynamics.bias(q, v))
-    assert np.allclose(M @ minimal.solution, minimal.force, rtol=1e-12)
-    minimal.data.qacc[:] = 0.0
-    loops["MuJoCo, mj_forward"](1)
-    assert np.allclose(minimal.data.qacc, dynamics.acceleration(q, v, nothing), rtol=1e-12)
+        loops = calls.loops(dynamics, q, v, nothing)
+        assert not loops["MuJoCo, equal work"](0).any()
+        bias, acceleration = loops["MuJoCo, equal work"](1)
+        assert np.array_equal(bias, dynamics.bias(q, v))
+        assert np.allclose(dynamics.mass_matrix(q) @ acceleration, bias, rtol=1e-12)
+        *_, data = loops["MuJoCo, mj_forward"].args
+        data.qacc[:] = 0.0
+        loops["MuJoCo, mj_forward"](1)
+        assert np.allclose(data.qacc, dynamics.acceleration(q, v, nothing), rtol=1e-12)
 
 
 def test_a_step_is_differenced_in_movements(rng):

@@ -88,18 +88,6 @@ def assert_locked(reading, names, rng):
     return dynamics
 
 
-def test_a_file_with_every_kind_of_joint():
-    reading = read(PATHS["mixed"])
-    tree = reading.tree
-    assert ", ".join(tree.joint_names[:7]) == "track, swing, joint 2, base x, base y, base z, base turn"
-    assert tree.body_names == ("carriage", "body 3", "base", "tail", "tip", "leg", "foot")
-    assert tree.parent == (-1, 0, 1, -1, 3, 4, 5, 6, 6, 8, 9)
-    assert np.allclose(tree.rest[:10], [0.05, 0.0, 0.6, *reading.qpos0[3:10]])  # a free base has no spring
-    assert reading.ranges == ((-1.0, 1.0), *[None] * 8, (-2.0, 2.0), None)
-    assert (reading.integrator, reading.dt, reading.warnings) == ("Euler", 0.002, ())
-    assert [f.feature for f in reading.features] == OF_MIXED
-
-
 @settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), SOME_KINDS, st.integers(3, 6))
 def test_a_random_tree_is_the_same_in_both(seed, kinds, joints):
@@ -184,24 +172,11 @@ def test_what_has_no_name_is_called_by_its_kind_and_number_but_not_as_another():
     assert read(text).tree.joint_names[1] == "joint 0"
 
 
-@pytest.mark.parametrize("name", ["base x", "base turn", "track", "joint 2", "tail", "leg pitch"])
-def test_a_joint_alone_and_left_alone(name, rng):
-    reading = read(PATHS["mixed"])
-    assert_locked(reading, [name], rng)
-    assert_locked(reading, [other for other in reading.tree.joint_names if other != name], rng)
-
-
 @pytest.mark.parametrize("parts", [["x", "z"], ["y", "turn"], ["x", "y", "z"], ["x", "y", "z", "turn"]])
 def test_parts_of_a_free_joint_and_others(parts, rng):
     heavy = '<joint name="base" type="free" armature="0.1"/>'
     text = PATHS["mixed"].read_text(encoding="utf-8").replace('<freejoint name="base"/>', heavy)
     assert_locked(read(text), [f"base {part}" for part in parts] + ["joint 2", "tail"], rng)
-
-
-def test_the_only_joint_of_a_file_may_be_locked():
-    for bare in (False, True):
-        model = Source(mjcf(PLAIN)).without({"j": 0.7}, bare)
-        assert (model.nv, model.nbody) == (0, 2) and model.body("b").quat[0] == pytest.approx(np.cos(0.35))
 
 
 def test_what_refers_to_a_locked_joint_goes_too(rng):
@@ -254,13 +229,6 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes_something(op
     assert {row.quantity for row in rows.values() if row.why == name} == quantities
     for row in rows.values():
         assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
-
-
-def test_the_mass_of_geoms_is_stated_where_each_has_one():
-    heavy = PLAIN.replace('name="g"', 'name="g" mass="2"')
-    row = rows_of(mjcf(heavy))["b", "mass"]
-    assert (row.stated, row.compiled, row.why) == (2.0, 2.0, "")
-    assert rows_of(mjcf())["b", "mass"].stated is None
 
 
 def test_a_tensor_may_be_off_by_rounding_of_the_sum_of_its_moments():

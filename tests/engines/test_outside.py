@@ -27,8 +27,6 @@ PENDULUM = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody><body><joint name
 TWO_LINKS = f"""<mujoco><option gravity="1 2 -9.81"/><worldbody><body><joint name="hip" axis="0 1 0" armature="0.01"/>
 {BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}<body pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
 {BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}</body></body></worldbody></mujoco>"""
-FREE_BODY = f"""<mujoco><option gravity="0 0 0"/><worldbody><body name="top"><freejoint name="base"/>
-{BODY.format("0 0 0", 2, "0.3 0.2 0.1")}</body></worldbody></mujoco>"""
 
 
 def dynamics(engine, text_or_path, folder=None):
@@ -45,14 +43,6 @@ def near(values, expected, engine, scale=1.0):
     return np.abs(np.subtract(values, expected)).max() <= FACTOR * RECORDS[engine].eps * scale
 
 
-def test_a_pendulum(engine, tmp_path):
-    of, _robot = dynamics(engine, PENDULUM, tmp_path)
-    q, v, tau = np.array([[0.5]]), np.array([[1.5]]), np.array([[0.25]])
-    inertia, moment = 0.2 + 2 * 0.25, 2 * 9.81 * 0.5 * np.sin(0.5)
-    assert near(of.mass_matrix(q), inertia, engine) and near(of.bias(q, v), moment, engine, 10.0)
-    assert near(of.acceleration(q, v, tau), (0.25 - 0.1 * 1.5 - moment) / inertia, engine, 100.0)
-
-
 def test_derivatives_are_those_of_the_equations(engine, tmp_path):
     """Of two joints, which compile soon, by movements, speeds and torques, with damping and a spring."""
     text = TWO_LINKS.replace('name="hip"', 'name="hip" damping="0.3"').replace(
@@ -64,19 +54,6 @@ def test_derivatives_are_those_of_the_equations(engine, tmp_path):
     q, v, tau = np.random.default_rng(2).uniform(-1.0, 1.0, (3, 2, 2))
     expected = np.stack(tmt.derivatives(q, v, tau, robot.tree)[:3], axis=1)
     assert near(of.derivatives(q, v, tau), expected, engine, 1e3 * np.abs(expected).max())
-
-
-def test_a_free_body_that_spins(engine, tmp_path):
-    """Euler's equations in body axes; the linear velocity is the world's; the body is turned."""
-    of, _ = dynamics_or_skip(engine, FREE_BODY, tmp_path)
-    turn = np.array([0.8, 0.0, 0.6, 0.0])
-    q, v = np.array([[1.0, 2.0, 3.0, *turn]]), np.array([[0.5, -0.5, 0.25, 1.0, 2.0, 3.0]])
-    tau, moments, w = np.array([[2.0, 0.0, 4.0, 0.1, 0.2, 0.3]]), np.array([0.3, 0.2, 0.1]), v[0, 3:]
-    turning = np.cross(w, moments * w)
-    assert near(of.mass_matrix(q), np.diag([2.0, 2.0, 2.0, *moments]), engine, 2.0)
-    assert near(of.bias(q, v), [0, 0, 0, *turning], engine, 10.0)
-    expected = [1.0, 0.0, 2.0, *((tau[0, 3:] - turning) / moments)]
-    assert near(of.acceleration(q, v, tau), expected, engine, 100.0)
 
 
 def test_an_arm_of_two_links_under_an_oblique_gravity(engine, tmp_path):

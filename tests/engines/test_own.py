@@ -7,8 +7,6 @@ import types
 import numpy as np
 import pytest
 import sympy
-from edited import setup_of_file
-from models import PATHS
 from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
@@ -221,18 +219,6 @@ def test_a_case_changes_own_equations_as_it_changes_the_others(changes, rng):
     state = states(rng, 4, case.coordinates.nv)
     for name in ("mass_matrix", "bias", "gravity", "acceleration"):
         assert np.allclose(asked(ours, name, state), asked(theirs, name, state), atol=1e-11), name
-
-
-def test_it_runs_by_the_same_rk4_as_tmt_balls_too(rng):
-    robot = setup_of_file(PATHS["pendulum_ball"]).robot
-    equations = OwnEquations(robot.tree, robot.coordinates, tree=robot.tree)
-    own = Own(equations, ("rk4_mean_speed",)).of(robot.case())
-    start = robot.coordinates.random(rng, 2), *rng.normal(size=(2, 2, robot.coordinates.nv))
-    for method in ("rk4", "rk4_mean_speed"):
-        motion = own.run(*start, 0.01, 10, method)
-        known = Tmt(("rk4_mean_speed",)).of(robot.case()).run(*start, 0.01, 10, method)
-        assert np.allclose(motion.states, known.states, atol=1e-11)
-        assert np.array_equal(motion.t, known.t) and motion.evaluations == known.evaluations == 2 * 10 * 4
 
 
 def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_number():

@@ -4,16 +4,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from edited import setup_of_file
 
 import tmt
 from compare.core.finding import Finding
 from compare.core.text import say
 from compare.engines.mujoco import read
-from compare.engines.mujoco.differences import of_inverse, of_steps, of_transition
-from compare.experiments.derivatives import add_advice, begin, contact_rows, of_mujoco, subjects, ways
+from compare.experiments.derivatives import add_advice, contact_rows, of_mujoco, subjects, ways
 from compare.experiments.derivatives.figures_derivatives import draw_errors
-from compare.experiments.derivatives.ways import CostRow, DerivativeRow, best_of, worst_of_each_eps
+from compare.experiments.derivatives.ways import CostRow, DerivativeRow, worst_of_each_eps
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 
@@ -85,28 +83,6 @@ def test_the_eps_is_that_of_mujocos_own_function_and_of_the_files_integrator(int
     assert min(drawn, key=lambda size: drawn[size].size) == eps  # as the figure has it
 
 
-@pytest.mark.parametrize("integrator", ["Euler", "implicit", "RK4"])
-def test_all_scenes_have_the_files_integrator(integrator):
-    xml = FREE_WITH_HINGE.replace("<mujoco>", f'<mujoco><option integrator="{integrator}"/>')
-    setup = setup_of_file(xml)
-    tasks: list[ways.Task] = []
-    begin(dataclasses.replace(setup, map=lambda _, given: tasks.extend(given)))
-    assert {task.subject.kind for task in tasks} == {"scene", "stiff", "singular"}
-    assert all(integrator in task.integrators for task in tasks)
-
-
-def test_differences_in_mujoco_are_those_of_its_steps(mujoco, bent):
-    """mjd_transitionFD is, where the way is the same, what differences of mj_step are."""
-    dynamics, state = mujoco.of(bent.case), (bent.q[0], bent.qd[0], bent.tau[0])
-    for centred in (False, True):
-        functions = of_transition, of_steps
-        own, steps = (f(dynamics, *state, DT, "implicitfast", 1e-6, centred)() for f in functions)
-        assert np.abs(own - steps[:, :6]).max() < 1e-8
-    inverse = of_inverse(dynamics, *state[:2], np.ones(3), 1e-7)()
-    truth = np.hstack(ways.tmt.inverse_dynamics_derivatives(*state[:2], np.ones(3), bent.tree))
-    assert np.abs(inverse - truth).max() < 1e-4 < np.abs(truth[:, :3] - truth[:, :3].T).max()
-
-
 def test_a_wrong_damper_is_seen_in_the_centred_differences(mujoco, bent):
     assert max(shares(mujoco, bent, "Euler", "RK4").values()) <= 1.0
     damping = tuple(x + 1e-8 for x in bent.tree.damping)
@@ -146,22 +122,6 @@ def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relat
     assert ways.relative(np.nan * off, exact, forces)[0] == np.inf
 
 
-FREE_WITH_HINGE = """<mujoco><worldbody><body pos="0 0 1"><freejoint/>
-<inertial pos="0 0 0" mass="2" diaginertia="0.1 0.2 0.25"/><body><joint axis="0 0.6 0.8"/>
-<inertial pos="0.1 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
-
-
-def test_a_slow_turn_of_a_free_body_is_rounded_as_a_quaternion():
-    """mjd_transitionFD makes a difference of less than 1e-15 rad zero; the components of a turn add to each other."""
-    setup = setup_of_file(FREE_WITH_HINGE)
-    case = setup.robot.cases[0]
-    q, qd, tau = case.q[None], np.full((1, 7), 0.1), np.zeros((1, 7))
-    subject = subjects.Subject("slow", "scene", case, case.tree, q, qd, tau)
-    task = ways.Task(subject, ("implicitfast",), False)
-    every = ways.measured(task, setup.engines["mujoco"], 1e-3)
-    assert max(share for one in every for share in one.shares.values()) <= 1.0
-
-
 @pytest.mark.parametrize("of_fourth", [8e3, 0.99e6])
 def test_where_two_terms_of_the_truncation_nearly_cancel_another_eps_tells_their_size(bent, of_fourth):
     """Those in eps^2 and eps^4, at 1e-2 or 1e-3."""
@@ -171,38 +131,10 @@ def test_where_two_terms_of_the_truncation_nearly_cancel_another_eps_tells_their
     assert 0.3 < ways.share_of_differences(values, exact, bent, step, DT) < 0.6
 
 
-DAMPED = """<mujoco><worldbody><body pos="0 0 1"><joint axis="0 1 0" damping="{0}"/>
-<inertial pos="0.1 0 0" mass="2" diaginertia="0.01 0.02 0.02"/><body pos="0.3 0 0"><joint axis="0 1 0" damping="{0}"/>
-<inertial pos="0.2 0 0" mass="1" diaginertia="1e-3 1e-3 1e-3"/></body></body></worldbody></mujoco>"""
-
-
-def test_rounding_is_carried_through_a_step_that_grows():
-    """Dampers with which a step of RK4 grows by 4e7: what its first stages round grows with it."""
-    setup = setup_of_file(DAMPED.format(1000))
-    case, mujoco = setup.robot.cases[0], setup.engines["mujoco"]
-    q, qd = np.array([[0.5, 0.7]]), np.array([[1e-6, -1e-6]])
-    tau = tmt.gravity_balance(q, case.tree)
-    subject = subjects.Subject("stiff", "scene", case, case.tree, q, qd, tau)
-    (*_, step) = ways.measured(ways.Task(subject, ("RK4",), False), mujoco, 2e-3)
-    assert step.rows[0].largest > 1e6 and max(step.shares.values()) <= 1.0
-
-
 def test_tmt_is_compared_with_mujocos_own_centred_function():
     ways_to_it = "mjd, one-sided", "differences, centred", "mjd, centred", ways.COMPILED
     costs = [CostRow(quantity="A", way=way, best_eps=None, error=0.0, time=1.0) for way in ways_to_it]
     assert of_mujoco(costs, "A") is costs[2] and of_mujoco(costs, "B") is None
-
-
-def test_where_differences_lose_digits_is_said(bent):
-    about = {"quantity": "A and B, RK4", "way": "a", "eps": 1e-5, "states": 1, "largest": 1.0}
-    about["unit"] = "rad per rad"
-    rows = [DerivativeRow(subject="stiff servos", error=error, **about) for error in (1e-7, 9e-9, None, 1e-9)]
-    pairs = [{"row": row, "scenes": rows[3]} for row in rows[:3]]
-    said = [say(Finding("derivatives", "hard", {"pairs": [pair]})) for pair in pairs]
-    assert "lose digits: stiff servos: 1e-07 with eps 1e-05 (A and B, RK4, rad per rad" in said[0]
-    assert "the same eps serves" in said[1] and "not finite" in said[2]
-    finer = dataclasses.replace(rows[0], eps=1e-6)
-    assert worst_of_each_eps(rows) == {1e-5: rows[2]} and best_of([*rows, finer]) is finer
 
 
 def test_hard_states_are_those_of_critical_dampers_and_of_the_least_definite_matrix(bent):

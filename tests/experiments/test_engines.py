@@ -17,6 +17,7 @@ from trees import tree_of_kinds
 from compare import engines
 from compare.core.check import About, Result
 from compare.engines import EngineRecord
+from compare.engines.outside import OutsideDynamics
 from compare.engines.outside.bodies import Body, combined, links_of, numbers_of, size_of
 from compare.engines.outside.file import File
 from compare.engines.outside.model import FROM_FILE, ReadModel
@@ -223,9 +224,10 @@ def test_an_engine_without_a_function_is_not_judged_by_it():
 
 
 @pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature"))
-def test_a_number_as_read_just_inside_and_just_outside(number):
+def test_a_number_as_read_just_inside_and_just_outside(number, monkeypatch):
     """Masses and moments are checked; a number that an engine drops or sets otherwise is a finding."""
     stated = numbers_of(ARM.tree)
+    monkeypatch.setitem(engines.RECORDS, "other", RECORDS["float64"])
     for off, differs in ((60.0, False), (70.0, True)):
         result, read = EnginesResult("engines"), {name: values.copy() for name, values in stated.items()}
         result.tables["engines_read"] = []
@@ -234,7 +236,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
         read[number][..., -1] += off * RECORDS["float64"].eps * size * (differs or not is_none)
         reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}, "copied": None,
                    "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
-        compare_numbers(result, ARM, RECORDS["float64"], reading)
+        compare_numbers(result, ARM, "other", reading)
         failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
         assert [check.quantity for check in result.checks if not check.passed] == failed
         assert [row.number for row in result.tables["engines_read"][:1]] == [number] * differs
@@ -315,3 +317,10 @@ def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
     assert integrators.order_of(steps, errors, 1e-2) is None
     finer = [2.0**-k for k in range(7, 14)]
     assert integrators.order_of(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
+
+
+def test_damping_that_acts_is_what_was_read_where_nothing_is_set():
+    for is_set, damping in ((True, 0.1), (False, 0.5)):
+        of = OutsideDynamics("none", ARM.case(damping=0.1), is_set)
+        vars(of)["reading"] = {"read": {"damping": np.full(3, 0.5)}, "lacking": ("stiffness",)}
+        assert of.acting.damping == (damping,) * 3

@@ -1,30 +1,27 @@
 """Which engine: servos, batches, times, the reference, the cheapest method, --engines."""
 
 import dataclasses
-from itertools import accumulate, chain, product, repeat
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from compare import experiments
-from compare.core import timing
 from compare.core.errors import Refused
 from compare.engines import RECORDS
 from compare.engines.outside import Outside, servos_of
 from compare.engines.outside.bodies import numbers_of
 from compare.engines.outside.model import FROM_FILE
-from compare.experiments.engines import batches, rows, servos
+from compare.experiments.engines import rows, servos
 from compare.experiments.engines.answer import cheapest_engine, cheapest_of
 from compare.experiments.engines.integrators import step_of
-from compare.experiments.engines.motion import BRIEF, MANY, brief, free_scene, reference
+from compare.experiments.engines.motion import free_scene
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult, MethodRow
 from compare.experiments.setup import Setup, engines
 from compare.robots.arm import ARM
 from compare.run.examine import not_chosen
 from compare.run.reference import compared_with
-from compare.truth import reference as truth
 
 LEG = """<mujoco><option timestep="0.004"/><worldbody><body pos="0 0 1"><joint name="hip" axis="0 1 0" damping="0.2"/>
 <inertial pos="0 0 -0.3" mass="1" diaginertia="0.03 0.03 0.01"/></body></worldbody>
@@ -78,51 +75,6 @@ def test_the_law_that_other_engines_get_is_that_of_the_actuators(setup):
     law = servos_of(case)
     assert law.position_gain == pytest.approx(60.0) and law.speed_gain == pytest.approx(4.0)
     assert servos_of(free_scene(setup)) is None
-
-
-def test_batches_have_the_same_error_for_any_number_of_worlds(setup, monkeypatch):
-    monkeypatch.setattr(batches, "WORLDS", (1, 5))
-    result = EnginesResult("engines", tables={"engines_batches": []})
-    for name in ("mujoco", "tmt"):
-        batches.time_batches(result, setup, setup.engines[name])
-    rows = result.tables["engines_batches"]
-    assert [(row.engine, row.worlds) for row in rows] == [*product(("MuJoCo", "TMT"), (1, 5))]
-    assert all(row.per_step_and_world > 0.0 and "CPU" in row.device for row in rows)
-    assert np.ptp([row.worst_error for row in rows]) <= 1e-13 and 0.0 < rows[0].worst_error < 1e-4
-
-
-@pytest.mark.parametrize("first", (0.016, 0.2))
-def test_a_first_call_that_is_disturbed_does_not_move_a_time(first, monkeypatch):
-    """A call of 1 ms that another process interrupts for 16 ms, or longer."""
-    moments = accumulate(chain.from_iterable(zip(repeat(0.0), chain([first], repeat(1e-3)))))
-    monkeypatch.setattr(timing.time, "perf_counter", lambda: next(moments))
-    (taken,) = timing.in_turns([lambda: None], rounds=5)
-    assert min(taken) == pytest.approx(1e-3) and timing.scatter(taken) <= timing.STEADY
-
-
-@pytest.mark.parametrize("taken, enough", (
-    ([0.3], True), ([0.02], False), ([0.02, 0.029], True), ([0.02, 0.031], False), ([0.001] * 14, False), ([0.001] * 16, True),
-))  # fmt: skip
-def test_when_a_function_was_called_often_enough(taken, enough):
-    assert timing.is_timed(taken) is enough
-
-
-def test_the_reference_of_engines_is_more_exact_than_doubles(setup):
-    case = ARM.cases[0].changed(duration=1.0, dt=1.0 / 64, judged=0.0)
-    near, exact = reference(case), truth.reference(case)
-    error = np.abs((near.high - exact.high) + (near.low - exact.low)).max()
-    assert error < 1e-16 * np.abs(exact.high).max() and error <= 10.0 * near.apart + 1e-18
-
-
-@pytest.mark.parametrize("speeds", (MANY, MANY + 1))
-def test_the_motion_of_a_robot_with_many_speeds_is_brief(speeds, tmp_path):
-    path = tmp_path / "chain.xml"
-    inertial = '<inertial pos="0 0 -0.1" mass="1" diaginertia="0.01 0.01 0.01"/>'
-    link = f'<body pos="0 0 -0.2"><joint axis="0 1 0" damping="0.1"/>{inertial}'
-    path.write_text(f"<mujoco><worldbody>{link * speeds}{'</body>' * speeds}</worldbody></mujoco>")
-    case = next(case for case in compared_with("model", str(path)).robot.cases if not case.is_held)
-    assert brief(case).duration == (BRIEF if speeds > MANY else case.duration) < 10.0
-    assert brief(case).scene.dt <= case.scene.dt and brief(None) is None
 
 
 def row(method, error, seconds, alone=None):

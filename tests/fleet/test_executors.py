@@ -77,13 +77,6 @@ def machines(tmp_path):
 
 
 @pytest.mark.slow
-def test_outcomes_on_a_cluster(machines):
-    machines.worker("--nanny")
-    with closing(Cluster(machines.address, toy.LIMIT)) as cluster:
-        toy.check_all(cluster)
-
-
-@pytest.mark.slow
 def test_a_worker_and_a_scheduler_that_are_killed(machines, tmp_path, monkeypatch):
     workers, opened = [machines.worker("--nanny"), machines.worker()], tmp_path / "opened"
     (folder := tmp_path / "notes").mkdir()

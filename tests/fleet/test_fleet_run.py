@@ -11,11 +11,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from compare.core.errors import described
+from compare.core.errors import Refused, described
+from compare.fleet import cache as module
+from compare.fleet.cache import locked, write_whole
 from compare.fleet.command import solution_files
 from compare.fleet.executors import Outcome
 from compare.fleet.models import found_models, place_of_report
-from compare.fleet.run import AHEAD, Run
+from compare.fleet.run import Run
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED, FileRow
 from compare.fleet.task import Compared, FleetOptions
 
@@ -156,11 +158,6 @@ def test_a_file_that_breaks_off_keeps_its_earlier_report_and_is_tried_again(flee
     assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"]
 
 
-def test_few_models_are_in_memory_at_a_time(fleet):
-    found = fleet({f"{k}.xml": PENDULUM.format(0.1 + k) for k in range(20)}, answer=agrees)
-    assert found.executor.most == AHEAD * Inside.workers and len(found.rows) == 20
-
-
 def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_matched(fleet, tmp_path):
     right = PENDULUM.format(0.1)
     (tmp_path / "solution.xml").write_text(right)
@@ -177,3 +174,39 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
     assert [name for name, row in found.rows.items() if not row.has_report] == ["slide.xml"]
     text = (report(tmp_path, "renamed.xml") / "report.md").read_text()
     assert "--only parameters --reference solution.xml" in text
+
+
+def test_a_folder_is_for_one_fleet_at_a_time_and_what_cannot_be_written_is_said(tmp_path):
+    with locked(tmp_path / "out"), pytest.raises(Refused, match="another"), locked(tmp_path / "out"):
+        pass
+    with locked(tmp_path / "out"):
+        write_whole(tmp_path / "out" / "a", {"b/c": b"1"})
+        write_whole(tmp_path / "out" / "a", {"d": b"2"})
+    assert [path.name for path in (tmp_path / "out" / "a").iterdir()] == ["d"]
+    with pytest.raises(Refused, match=f"{tmp_path / 'none' / 'a'}: "):
+        write_whole(tmp_path / "none" / "a", b"1")
+
+
+SOURCES = [f"compare/{name}" for name in ("a.py", "a.jinja", "deep/page.html.jinja")]
+SOURCES += ["mjcf/arm.xml", "tmt/b.py"]
+
+
+def test_a_source_that_changes_or_moves_and_another_version_make_another_program(tmp_path, monkeypatch):
+    for path in (tmp_path / one for one in (*SOURCES, "compare/a.pyc", "tests/test_a.py")):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("1")
+    monkeypatch.setattr(module, "ROOT", tmp_path)
+    which = module.program.__wrapped__
+    found = [which()]
+    for name in SOURCES:
+        (tmp_path / name).write_text("2")
+        found.append(which())
+        (tmp_path / name).rename((tmp_path / name).with_stem("other"))
+        found.append(which())
+    for package in ("mujoco", "numpy"):
+        monkeypatch.setattr(module, "installed", lambda name, package=package: str(name == package))
+        found.append(which())
+    assert len(set(found)) == len(found)
+    (tmp_path / "compare" / "a.pyc").unlink()
+    (tmp_path / "tests" / "test_a.py").write_text("2")
+    assert which() == found[-1]

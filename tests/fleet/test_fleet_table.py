@@ -2,19 +2,23 @@
 
 import csv
 import dataclasses
-import html
+import json
 import random
 import re
+import shutil
 from functools import partial
 from types import SimpleNamespace
-from urllib.parse import unquote
 
 import pytest
+import runs
 
+from compare.__main__ import main
 from compare.core.cause import Cause
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
+from compare.core.errors import Refused
 from compare.fleet import table
 from compare.fleet.models import place_of_report
+from compare.fleet.rubric import read_rubric
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED, FileRow
 from compare.report.verdict import Report, Section
 from compare.robots.arm import ARM
@@ -65,12 +69,6 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference="arm"):
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
     row = judged(*checks, **more)
     assert row.verdict == verdict and named in row.reason and bool(named) == bool(row.reason)
-
-
-def test_the_largest_share_is_of_all_checks_of_rounding_also_where_one_fails():
-    assert judged(good(0.2), good(3.0), OWN).worst_ratio == 3.0
-    diverged = judged(good(0.2), ("M", None, 1.0, "", "at most", About.MODELS))
-    assert (diverged.verdict, diverged.worst_ratio) == (DIFFER, 0.2)
 
 
 def limit(dt, stable, integrator="Euler", kind="finite"):
@@ -128,18 +126,6 @@ def page_of(rows, **more):
     return table.fleet_page(rows=rows, **given | more)
 
 
-def test_every_name_leads_to_its_report():
-    names = ["with space.xml", "ümlaut/x.xml", "a#b.xml", "a%41b.xml", "it's \"q\".xml", "<b>.xml", "q?x=1.xml",
-             "new\\nline.xml", "c:d;e.xml", "../up.xml", "/far/away.xml", "$title.xml"]  # fmt: skip
-    text = page_of([row(file=name) for name in names])
-    links = re.findall(r'<th scope="row"><a href="([^"]*)">(.*?)</a></th>', text)
-    assert [html.unescape(name.replace("<wbr>", "")) for _, name in links] == names
-    for (address, _), name in zip(links, names, strict=True):
-        address = html.unescape(address)
-        assert not set(address) & set("#?\"'<> ") and ":" not in address  # no fragment, no scheme
-        assert unquote(address) == f"{place_of_report(name)}/index.html"
-
-
 def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():
     rows = [ROW, row(stable_at_file_dt=False), FileRow(file="a b.xml", verdict=REFUSED), row(verdict=ITSELF)]
     text = page_of(rows)
@@ -167,3 +153,82 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     text = (tmp_path / "index.html").read_text()
     assert all(part in text for part in ("early.xml", "the command", '"files/c.xml/index.html">d.xml</a>'))
     assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
+
+
+EXPERIMENTS = "parameters", "mass"
+
+
+RIGHT = """parameters = 4
+[mass]
+Mbar = 1.5
+"M, bent" = 0.5
+"""
+
+
+def read(tmp_path, content):
+    path = tmp_path / "points.toml"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_rubric(str(path), EXPERIMENTS)
+
+
+@pytest.mark.parametrize("content, word", [
+    ("mass = ", "not a TOML file"), (b"\xff\xfe", "not a TOML file"), ("[[[", "not a TOML file"), ("", "no entry"),
+    ("speed = 1", "speed is not an experiment of this fleet: parameters and mass"),
+    ("[mas]\nMbar = 1", "mas is not an experiment"),
+    ("mass = -1", "mass is -1; expected points"), ("mass = true", "mass is True"), ("mass = 'two'", "mass is 'two'"),
+    ("mass = nan", "mass is nan"), ("[mass]\nMbar = [1]", r"mass: Mbar is \[1\]"),
+])  # fmt: skip
+def test_what_is_wrong_in_a_rubric_is_one_line(content, word, tmp_path):
+    with pytest.raises(Refused, match=word) as refused:
+        read(tmp_path, content)
+    assert len(str(refused.value).splitlines()) == 1 and "points.toml" in str(refused.value)
+
+
+def report(tmp_path, name, checks):
+    """Write the report of a file with checks (experiment, quantity, scene, passed)."""
+    folder = tmp_path / place_of_report(name)
+    folder.mkdir(parents=True)
+    fields = "experiment", "quantity", "scene", "passed"
+    content = {"checks": [dict(zip(fields, check)) for check in checks]}
+    (folder / "results.json").write_text(json.dumps(content))
+    return FileRow(file=name, verdict=AGREE, has_report=True)
+
+
+@pytest.mark.parametrize("checks, points", [
+    ([("parameters", "com", "a", True), ("mass", "Mbar", "bent", True), ("mass", "M", "bent", True)], 6.0),
+    ([("parameters", "com", "a", True), ("parameters", "com", "b", False), ("mass", "Mbar", "bent", True)], 1.5),
+    ([("mass", "M", "bent", True), ("mass", "M", "zero", False), ("mass", "Mbar", "zero", False)], 0.5),
+    ([("gravity", "Mbar", "bent", True)], 0.0),
+])  # fmt: skip
+def test_all_checks_of_an_entry_must_pass_and_one_at_least_be_there(checks, points, tmp_path):
+    rubric = read(tmp_path, RIGHT)
+    every = [("parameters", "", "", True), ("mass", "Mbar", "", True), ("mass", "M", "bent", True)]
+    rows = [report(tmp_path, "a.xml", checks), report(tmp_path, "b.xml", every)]
+    rows.append(FileRow(file="c.xml", verdict=REFUSED))
+    rows.append(FileRow(file="d.xml", verdict=AGREE, has_report=True, same_as="a.xml"))
+    rubric.award(rows, tmp_path)
+    assert [row.points for row in rows] == [points, 6.0, 0.0, points] and rubric.total == 6.0
+
+
+def test_a_check_that_no_file_has_is_named_with_those_that_are_known(tmp_path):
+    rubric = read(tmp_path, "[mass]\nNbar = 1")
+    row = report(tmp_path, "a.xml", [("mass", "Mbar", "bent", True)])
+    with pytest.raises(Refused, match="mass: no file has a check 'Nbar'; known: Mbar"):
+        rubric.award([row], tmp_path)
+    rubric.award([FileRow(file="a.xml", verdict=REFUSED)], tmp_path)  # no report: nothing is known
+
+
+def test_points_are_in_the_table_and_in_the_page(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(runs.ROOT / "tests" / "models" / "pendulum_ball.xml", "a.xml")
+    (tmp_path / "b.xml").write_text("no model")
+    (tmp_path / "points.toml").write_text("parameters = 3")
+    words = ["fleet", "a.xml", "b.xml", "--only", "parameters", "--out", "out", "--workers", "1"]
+    assert main([*words, "--rubric", "points.toml"]) == 0
+    with (tmp_path / "out" / "fleet.csv").open(encoding="utf-8", newline="") as file:
+        rows = {row["file"]: row["points"] for row in csv.DictReader(file)}
+    assert rows == {"a.xml": "3.0", "b.xml": "0.0"}
+    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
+    assert ">3 of 3<" in page and ">0 of 3<" in page and ">points<" in page
+    assert main(words) == 0
+    assert "points" not in (tmp_path / "out" / "fleet.csv").read_text(encoding="utf-8")

@@ -2,7 +2,6 @@
 
 import io
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ from mujoco import MjModel
 from PIL import Image
 
 from compare.core.errors import Refused
-from compare.fleet.models import bundle, found_models, place_of_report, unpacked
+from compare.fleet.models import bundle, found_models, unpacked
 
 MODEL = "<mujoco><worldbody><body><joint/><geom size='1'/></body></worldbody></mujoco>"
 
@@ -75,35 +74,6 @@ def test_a_word_that_names_nothing_is_refused_in_one_line(asked, says, here):
     assert len(str(refused.value).splitlines()) == 1
 
 
-def test_the_same_file_is_there_once_however_it_is_named(here, tmp_path):
-    here(["m/a.xml", "m/b.xml"])
-    asked = "m", "m/a.xml", "./m/../m/a.xml", str(tmp_path / "m" / "a.xml"), "m/*.xml"
-    assert names(*asked) == ["m/a.xml", "m/b.xml"]
-    links = {"m/0.xml": "a.xml", "m/dangling.xml": "nowhere.xml", "m/self": ".", "n": "m"}
-    for name, target in links.items():
-        Path(name).symlink_to(target)
-    assert names("m", "n") == ["m/a.xml", "m/b.xml"]
-
-
-def test_parts_are_left_out_unless_they_are_named(here):
-    here("m/scene.xml", "<mujoco><include file='robot.xml'/><include file='settings.xml'/></mujoco>")
-    here("m/robot.xml")
-    here(["m/settings.xml", "m/lonely.xml"], "<mujocoinclude><option timestep='0.001'/></mujocoinclude>")
-    left = left_out("m")
-    assert names("m") == ["m/scene.xml"] and list(left) == ["m/lonely.xml", "m/robot.xml", "m/settings.xml"]
-    assert "m/scene.xml" in left["m/settings.xml"] and left["m/robot.xml"] == left["m/settings.xml"]
-    assert names("m", "m/lonely.xml", "m/robot.xml") == ["m/lonely.xml", "m/robot.xml", "m/scene.xml"]
-
-
-def test_reports_of_two_files_are_never_in_one_folder(tmp_path):
-    asked = ["a/b.xml", "/a/b.xml", "../a/b.xml", "../../a/b.xml", "a/../b.xml", "b.xml", "up/a/b.xml",
-             "ü/b.xml" if sys.getfilesystemencoding() == "utf-8" else "u/b.xml", "a/B.xml/c.xml"]  # fmt: skip
-    places = [place_of_report(shown) for shown in asked]
-    assert len({place.casefold() for place in places}) == len(asked) and places[0] == "files/a/b.xml"
-    assert not any(other.startswith(f"{place}/") for place in places for other in places)
-    assert all((tmp_path / place).resolve().is_relative_to(tmp_path / "files") for place in places)
-
-
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 {}\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 GEOM, MESH = "<geom type='mesh' mesh='m'/>", "<mesh name='m' file='{}'/>"
 
@@ -150,18 +120,3 @@ def test_everything_that_a_model_needs_is_sent_and_compiles_elsewhere(collection
     assert (after.opt.timestep, after.nmesh, after.nhfield, after.ntex) == (0.003, 2, 1, 1)
     for name in ("body_mass", "body_inertia", "mesh_vert", "hfield_data", "tex_data"):
         assert np.array_equal(getattr(before, name), getattr(after, name)), name
-
-
-def test_paths_that_are_absolute_stripped_missing_or_in_a_circle(here, tmp_path):
-    here(["assets/s.obj", "far/s.obj"], TETRAHEDRON.format(1))
-    strip = "<compiler assetdir='assets' strippath='true'/>"
-    here("stripped.xml", robot(MESH.format("C:\\far\\away/s.obj"), more=strip))
-    (model,) = found_models(["stripped.xml"])[0]
-    assert MjModel.from_xml_path(str(unpacked(bundle(model), tmp_path / "elsewhere"))).nmesh == 1
-    here("absolute.xml", robot(MESH.format(f"{tmp_path}/far/s.obj")))
-    assert Path(tmp_path, "far/s.obj") in found_models(["absolute.xml"])[0][0].parts
-    here("missing.xml", robot(MESH.format("x" * 5000) + "<mesh file='/dev/zero'/>"))
-    assert list(found_models(["missing.xml"])[0][0].parts) == [Path("missing.xml")]
-    here("a.xml", "<mujoco><compiler meshdir='far'/><include file='b.xml'/><include file='a.xml'/></mujoco>")
-    here("b.xml", "<mujoco><include file='a.xml'/><mesh file='s.obj'/></mujoco>")
-    assert sorted(map(str, found_models(["a.xml"])[0][0].parts)) == ["a.xml", "b.xml", "far/s.obj"]

@@ -1,10 +1,14 @@
-"""What turns two sets of values into a verdict: rules, which state is judged, and by which tolerance."""
+"""What turns two sets of values into a verdict: rules, which state is judged, by which tolerance; timing; words of sentences."""
+
+import time
 
 import numpy as np
 import pytest
 
+from compare.core import timing
 from compare.core.check import Result
-from compare.judge.agree import agree, closest, worst_of_each
+from compare.core.words import milliseconds, scene_of
+from compare.judge.agree import agree, closest
 from compare.robots.arm import ARM
 from compare.robots.states import Sample
 from tmt.exact.many import Pairs
@@ -114,8 +118,31 @@ def test_the_difference_closest_to_its_tolerance(difference, tolerance, place):
     assert closest(np.array(difference), np.array(tolerance)) == (place,)
 
 
-def test_a_scale_of_each_entry_may_be_the_same_for_all_states_or_bodies():
-    differences = -np.arange(12.0).reshape(2, 3, 2)
-    for scale in ([[[1.0, 4.0]]], np.broadcast_to([1.0, 4.0], (5, 3, 2))):
-        assert np.array_equal(worst_of_each(differences, np.array(scale)), [[4.0, 10.0], [1.0, 1.0]])
-    assert np.array_equal(worst_of_each(differences, np.array([2.0, 3.0, 9.0])), [[5.0, 11.0], [2.0, 3.0]])
+def test_what_is_compared_is_called_in_turns_and_the_first_call_is_not_counted(monkeypatch):
+    now, order = [0.0], []
+    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
+    # a long call is made less often, until two agree; a very long one once
+    left = {"a": [3.9e-3, 0.014, 6e-3, 2e-3], "b": [0.3], "c": [0.013, 0.018], "d": [0.2, 0.1, 0.11]}
+
+    def call(name):
+        now[0] += left[name].pop(0)
+
+    found = timing.fastest({name: lambda name=name: call(name) for name in left}, 3)
+    assert found == {"a": pytest.approx(2e-3), "b": pytest.approx(0.3), "c": pytest.approx(0.013),
+                     "d": pytest.approx(0.1)}  # fmt: skip
+    assert not any(left.values())
+    times = timing.in_turns([lambda: order.append("d"), lambda: order.append("e")], 3)
+    assert order == ["d", "e"] * 4 and [len(t) for t in times] == [3, 3]
+
+
+def test_a_check_belongs_to_the_scene_of_the_longest_name():
+    names = ["bent", "bent, free", "bent, freely", "free"]
+    assert scene_of("bent, free, RK4, dt = 5/64 s", names) == scene_of("bent, free", names) == "bent, free"
+    assert scene_of("bent, RK4", names) == "bent" and scene_of("bending, RK4", names) is None
+
+
+def test_a_time_near_another_has_as_many_digits_as_tell_them_apart():
+    limit, step = 2.0149e-3, 2.0e-3
+    assert milliseconds(limit) == milliseconds(step) == "2 ms"
+    assert (milliseconds(limit, step), milliseconds(step, limit)) == ("2.015 ms", "2 ms")
+    assert milliseconds(2.2049e-3, step) == "2.2 ms"

@@ -133,18 +133,6 @@ def test_the_rounding_of_a_turn_is_that_of_a_product_of_quaternions():
     assert OF_A_BALL == (2 * 12 + 8) * EPS
 
 
-def test_a_slide_is_rounded_by_its_length_and_a_ball_by_a_whole_turn():
-    tree = dataclasses.replace(
-        TURN, joint_names=("lift", "head"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "ball"),
-        axis=((0.0, 0.0, 1.0), *np.eye(3)), damping=(0.0,) * 4, body_joint=(1,), armature=(), stiffness=(), rest=(),
-        reference=(),
-    )  # fmt: skip
-    q, qd = np.array([[2.0, 0.6, 0.0, 0.8, 0.0]]), np.array([[1.0, 0.0, 0.0, 4.0]])
-    (found,) = step_rounding(METHODS["rk4"], tree, q, qd, np.zeros(4), 1e-3)
-    expected = 8 * EPS * np.array([2.0 + 1e-3, 4.0, 4.0, 4.0 + 4e-3]) + 1e-3 * found[4:]
-    assert found[:4] == pytest.approx(expected, rel=1e-12) and OF_A_BALL == 8 * EPS * 4.0
-
-
 def test_the_band_is_infinite_from_where_a_run_diverges_or_after_the_steps_that_are_asked_for():
     q, qd, *_ = turning(16, 0.1)
     run = METHODS["rk4"], TURN, q, qd, TORQUE, 0.1

@@ -1,4 +1,4 @@
-"""When a run has left, has diverged, how far it went; and robots too stiff for their step, just inside and just outside."""
+"""When a run has left or diverged, robots too stiff for their step, the order of a method: just inside and just outside."""
 
 import numpy as np
 import pytest
@@ -8,18 +8,17 @@ from trees import one_body
 
 import tmt
 from compare.core.check import Result
+from compare.judge.order import ORDER_MARGIN, check_order
 from compare.judge.run import (
     check_movement,
     departure,
     deviation,
     diverged_at,
     leaves_no_digits,
-    movement_unit,
 )
 from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
-from compare.robots.case import Coordinates
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
@@ -41,16 +40,6 @@ def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved)
         kinetic = share * allowed + at_first - gained
         new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(q, case.tree)[0, 0]), 0.0, 0.0])
         assert diverged_at(case, T, np.array([start, q]), np.array([rate, new])) == ends
-
-
-def test_a_run_has_diverged_where_it_is_not_finite():
-    q, qd = np.zeros((3, 3)), np.zeros((3, 3))
-    for values in (q, qd):
-        for wrong in (np.nan, np.inf):
-            values[2, 1] = wrong
-            assert diverged_at(CASES["bent, free"], np.arange(3.0), q, qd) == 2.0
-            assert deviation(q, q[0]) == (np.inf if values is q else 0.0)
-            values[2, 1] = 0.0
 
 
 def test_an_arm_has_left_at_a_tenth_of_a_radian():
@@ -101,15 +90,6 @@ def test_a_servo_gives_no_more_than_it_has_stored(start):
         assert diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends
 
 
-def test_a_quaternion_and_its_negative_are_the_same_turn():
-    coordinates = Coordinates(("head",), ("ball",))
-    q = np.array([(1.0, 0.0, 0.0, 0.0), (-1.0, 0.0, 0.0, -0.049), (1.0, 0.0, 0.0, 0.051)])
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
-    assert deviation(q[:2], q[0], coordinates) == pytest.approx(2.0 * np.arctan(0.049))
-    assert departure(np.arange(3.0), q, coordinates) == 2.0
-    assert movement_unit(Coordinates(("a", "b"), ("slide", "ball"))) == "rad or m"
-
-
 @BOTH
 def test_a_rate_that_leaves_no_digits_after_two_steps(share, passes):
     dt = 1.0 / 8192
@@ -121,3 +101,27 @@ def test_a_rate_that_leaves_no_digits_after_two_steps(share, passes):
 def test_a_reference_in_doubles_is_not_asked_of_a_rate_with_which_it_diverges():
     assert has_no_reference(spring(1e6)) is None and has_no_reference(spring(9e12)) is not None
     assert leaves_no_digits(ARM) is None and has_no_reference(ARM) is None
+
+
+def checked(*order):
+    """The check of a measured order."""
+    result = Result("test")
+    check_order(result, "pendulum", *order)
+    return result.checks[0]
+
+
+@BOTH
+def test_a_measured_order_is_at_least_that_of_the_method_and_of_order_8_at_least_7(share, passes):
+    check = checked(4, 4.0 - share * ORDER_MARGIN, "error of the swing", "3.85")
+    assert check.passed == passes and check.quantity == "deviation from order 4: error of the swing"
+    assert checked(8, 8.0 - share).passed == passes and checked(8, 9.5).passed
+    assert checked(4, 5.0).passed  # the leading term of an error may vanish
+
+
+@BOTH
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("twin", [1.0, 2.0])
+def test_a_higher_order_is_that_of_the_same_scheme_in_tmt(share, passes, side, twin):
+    measured = twin + side * share * ORDER_MARGIN
+    check = checked(1, measured, "error", "", twin)
+    assert check.passed == passes and f"tmt's same scheme {twin:.2f}" in check.note

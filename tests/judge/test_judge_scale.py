@@ -98,14 +98,6 @@ def test_forces_sum_weight_springs_and_what_moves():
     assert np.allclose(OF.force(tau)[0], OF.bias[0] + 3.0 + drag[0] + springs[0], rtol=1e-14)
 
 
-def test_energies_have_the_springs():
-    g = 5.0 * np.dot(np.multiply(COUNT, TREE.mass), REACH[0])
-    springs = 20.0 * 0.8**2 / 2 + 5.0 * 0.7**2 / 2 + 3 * 2.0 * np.pi**2 / 2
-    assert OF.potential_energy[0] == pytest.approx(g + springs, rel=1e-14)
-    speeds = np.abs(QD[0])
-    assert OF.energy[0] == pytest.approx(g + springs + speeds @ OF.added[0] @ speeds / 2, rel=1e-14)
-
-
 def test_errors_go_through_the_inverse_entry_by_entry():
     M, force = tmt.mass_matrix(Q, TREE)[0], OF.force(1.0)
     qdd = np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0]] * 2)

@@ -4,17 +4,15 @@ Each edit is made in a copy of the project, and meets the tests of the default s
 """
 
 import argparse
-import difflib
 import os
 import re
 import shutil
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import closing, suppress
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import partial
 from importlib.util import cache_from_source
 from itertools import pairwise
 from pathlib import Path
@@ -44,7 +42,7 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     chosen = [edit for edit in EDITS if not options.words or any(word in edit.name for word in options.words)]
     try:
-        places = {edit: applied(PROJECT, edit) for edit in chosen}
+        places = [applied(PROJECT, edit) for edit in chosen]
     except DoesNotApply as error:
         print(f"does not apply: {error}")
         return 2
@@ -52,51 +50,32 @@ def main(arguments: list[str] | None = None) -> int:
         print("\n".join(edit.name for edit in chosen))
         return 0
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    caught_by, survived = set(), 0
-    with TemporaryDirectory(prefix="edits-") as folder:
-        copies = [Path(folder, str(number)) for number in range(options.jobs)]
-        for copy in copies:
+    caught_by = set()
+    with TemporaryDirectory(prefix="edits-") as folder, ThreadPoolExecutor(options.jobs) as pool:
+        idle = [Path(folder, str(number)) for number in range(options.jobs)]
+        for copy in idle:
             shutil.copytree(PROJECT, copy, ignore=NOT_COPIED)
-        with closing(outcomes(places, copies)) as tried:
-            for edit, seconds, caught in tried:
-                outcome = f"caught by {caught}" if caught else "SURVIVED"
-                print(f"{seconds:5.1f} s  {edit.name}: {outcome}", flush=True)
-                if caught.startswith("tests"):
-                    caught_by.add(caught.split("[")[0])
-                if not caught:
-                    survived += 1
-                    print(difference(places[edit]))
-        print(f"{len(chosen)} edits, {survived} survived")
-        if caught_by and (failed := first_failed(copies[0], sorted(caught_by))):
+        for edit, caught in zip(chosen, pool.map(partial(tried, idle), chosen, places)):
+            print(f"{edit.name}: {f'caught by {caught}' if caught else 'SURVIVED'}", flush=True)
+            caught_by.add(caught.split("[")[0])
+        print(f"{len(chosen)} edits{', some survived' if '' in caught_by else ''}")
+        again = sorted(test for test in caught_by if test.startswith("tests"))
+        if again and (failed := first_failed(idle[0], again)):
             print(f"fails without an edit: {failed}")
             return 2
-    return 1 if survived else 0
+    return int("" in caught_by)
 
 
-def outcomes(places: dict[Edit, Place], copies: list[Path]) -> Iterator[tuple[Edit, float, str]]:
-    """Each edit as it ends: its seconds, and which test caught it; empty if it survived."""
-    idle = list(copies)
-
-    def tried(edit: Edit, place: Place) -> tuple[Edit, float, str]:
-        copy, started = idle.pop(), time.perf_counter()
-        name = place.path.relative_to(PROJECT)
-        files = nearest(edit, name)
-        write(copy / name, place.after)
-        parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
-        caught = next(filter(None, (first_failed(copy, part) for part in parts)), "")
-        write(copy / name, place.before)
-        idle.append(copy)
-        return edit, time.perf_counter() - started, caught
-
-    with ThreadPoolExecutor(len(copies)) as pool:
-        under_way = [pool.submit(tried, *place) for place in places.items()]
-        try:
-            yield from (done.result() for done in as_completed(under_way))
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            while not all(future.done() for future in under_way):  # interrupted
-                end_children(os.getpid())
-                time.sleep(0.05)
+def tried(idle: list[Path], edit: Edit, place: Place) -> str:
+    """Which test catches an edit, in one of the copies that are idle; empty if it survives."""
+    copy, name = idle.pop(), place.path.relative_to(PROJECT)
+    files = nearest(edit, name)
+    write(copy / name, place.after)
+    parts = [files[start:end] for start, end in pairwise(SLICES) if files[start:end]]
+    caught = next(filter(None, (first_failed(copy, part) for part in parts)), "")
+    write(copy / name, place.before)
+    idle.append(copy)
+    return caught
 
 
 def write(file: Path, text: str) -> None:
@@ -153,11 +132,6 @@ def nearest(edit: Edit, name: Path) -> list[str]:
 
     files = [path for path in sorted(PROJECT.joinpath("tests").rglob("test_*.py")) if path.name not in BLIND]
     return [str(file.relative_to(PROJECT)) for file in sorted(files, key=named, reverse=True)]
-
-
-def difference(place: Place) -> str:
-    texts, name = (place.before.splitlines(), place.after.splitlines()), place.path.relative_to(PROJECT)
-    return "\n".join(difflib.unified_diff(*texts, f"a/{name}", f"b/{name}", n=1, lineterm=""))
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from contextlib import closing
 
 import pytest
 
-from compare.process.workers import Beginning, Clock, WorkerEnded, Workers, start_workers
+from compare.process.workers import Beginning, WorkerEnded, Workers, start_workers
 
 LONG = 0.1  # s
 SOON = 60.0  # s, far more than anything here takes
@@ -23,19 +23,6 @@ def busy(seconds):
 def break_off():
     busy(LONG)
     raise ValueError("broken")
-
-
-def test_waiting_is_nobodys_and_work_is_whose_it_is():
-    clock = Clock()
-    with clock.of("waits"):
-        time.sleep(5 * LONG)
-    with clock.of("works"):
-        busy(LONG)
-    clock.ends("works")
-    busy(LONG)  # for nobody
-    # the processor's time is that of all threads, and one of another test may be at its end
-    assert clock.seconds_of("waits") < 2 * LONG and LONG <= clock.seconds_of("works") < 3 * LONG
-    assert clock.ended["works"] >= 5 * LONG
 
 
 def test_what_a_worker_does_is_for_the_task_that_asked():
@@ -76,8 +63,3 @@ def test_a_process_that_is_killed_while_it_is_idle_is_replaced():
         os.kill(workers.submit(os.getpid).result(SOON), signal.SIGKILL)
         time.sleep(5 * LONG)
         assert workers.submit(abs, -4).result(SOON) == 4
-
-
-def test_what_cannot_be_sent_is_raised():
-    with closing(Workers(1, Beginning())) as workers, pytest.raises((AttributeError, TypeError)):
-        workers.submit(lambda: 4).result(SOON)

@@ -120,27 +120,6 @@ def test_after_kill_9_in_the_exchange_the_next_run_finds_the_old_report_whole(tm
     assert at == 7  # three moved in, two names of a folder changed, and what was moved away
 
 
-@posix
-@pytest.mark.parametrize("number, at", [(signal.SIGTERM, 0), (signal.SIGINT, 6)])
-def test_an_exchange_that_has_begun_is_finished_and_the_run_ends_well(tmp_path, number, at):
-    old_report(tmp_path)
-    asked = run(tmp_path, number, at)
-    assert (asked.returncode, asked.stdout, asked.stderr) == (0, "7\n", "")
-    assert files(tmp_path) == NEW and names_in(tmp_path) == {"report.md", "results.json", "tables"}
-
-
-def test_two_runs_at_once_both_end_well(tmp_path):
-    with new_report(tmp_path / "out") as first:
-        fill(first, "first")
-        with new_report(tmp_path / "out") as second:
-            fill(second, "second")
-            assert first.exists()  # the folder of a run that is alive stays
-        assert files(tmp_path / "out")["results.json"] == "second"
-        assert first.exists()
-    assert files(tmp_path / "out") == {"tables/mass.csv": "first", "results.json": "first"}
-    assert names_in(tmp_path / "out") == {"results.json", "tables"}
-
-
 def test_only_what_a_run_has_left_is_cleared(tmp_path):
     names = ".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md"
     left, *kept = (tmp_path / name for name in names)

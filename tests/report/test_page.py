@@ -1,7 +1,8 @@
-"""The files of a report: what stands on the first screen of the page and how it is marked, what all files have, what breaks."""
+"""The files of a report: the first screen of the page, what all files have, what breaks; pictures and provenance."""
 
 import json
 import re
+import subprocess
 from dataclasses import replace
 
 import pandas as pd
@@ -10,7 +11,7 @@ from matplotlib.figure import Figure as Drawing
 from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
-from compare.report import images
+from compare.report import images, provenance
 from compare.report.document import Document
 from compare.report.files import write
 from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
@@ -125,7 +126,7 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     sections[2].result.rows = [3]
     parts = write(folder, report)
     whys = {
-        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "ValueError",
+        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "TypeError",
         "speed in report.md": "AttributeError", "gravity in index.html": "FileNotFoundError",
         "speed in index.html": "AttributeError",
     }  # fmt: skip
@@ -137,3 +138,23 @@ def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
     failed = [check for check in results["checks"] if not check["passed"]]
     assert results["passed"] is False and {check["experiment"] for check in failed} == {"report"}
     assert len(failed) == len(whys) and len(results["causes"]) == 1
+
+
+def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
+    assert provenance.commit() is None  # no repository
+
+    def git(*words):
+        command = ["git", "-c", "user.name=a", "-c", "user.email=a@b", *words]
+        return subprocess.check_output(command, cwd=tmp_path, text=True, stderr=subprocess.DEVNULL).strip()
+
+    for name in ("compare/a", "tmt/a", "mjcf/a", "pyproject.toml"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    for words in (["init", "-q"], ["add", "-A"], ["commit", "-qm", "a"]):
+        git(*words)
+    (tmp_path / "notes.md").touch()
+    assert provenance.commit() == git("rev-parse", "HEAD")
+    (tmp_path / "tmt" / "b").touch()
+    assert provenance.commit() != git("rev-parse", "HEAD")
+    assert provenance.commit().startswith(git("rev-parse", "HEAD"))

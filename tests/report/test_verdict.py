@@ -5,15 +5,14 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from in_process import Lines
 from matplotlib.colors import to_hex
 from sections import BAD, GOOD, section
-from small_runs import Lines
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result
-from compare.core.text import say
-from compare.experiments import figures as figures_of_states
-from compare.experiments import module, stability
+from compare.core.finding import Finding
+from compare.experiments import module
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import conclusions
@@ -22,7 +21,7 @@ from compare.experiments.stability.tables import LimitRow, StabilityResult
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers
-from compare.report.style import BLUE, ORANGE, RED
+from compare.report.style import BLUE, ORANGE
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
 from compare.run.examine import say_outcome, section_with
@@ -97,15 +96,6 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
 
 
-def test_an_experiment_alone_is_named_and_a_step_that_is_not_stable_comes_first():
-    alone, other = section("stability", GOOD, OWN_STEP), section("mass", GOOD)
-    first, second, *_ = verdict([alone], 12, robot="leg.xml").split("\n")
-    assert first.startswith("leg.xml is not stable at its own step")
-    assert "agree in stability: 1 of 2" in second
-    lines = verdict([alone, other], 12, robot="leg.xml").split("\n")
-    assert lines[0] == first and "agree: 2 of 3" in lines[1] and "2 of 12 experiments" in lines[2]
-
-
 def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():
     some, none = section("mass", GOOD), section("gravity")
     for result in (some.result, none.result):
@@ -166,12 +156,6 @@ def test_the_largest_difference_is_the_answer_unless_a_run_diverged(rows, number
     assert number in found and scene in found
 
 
-def test_an_answer_has_what_its_experiment_adds():
-    of = section("trajectory", rows=[apart("s", 1e-9) | {"level": "open loop", "twin": "rk4"}])
-    of.result.answer = of.result.finding("answer", errors={"a": (1.0, 2.0), "b": (3.0, None)}, steps=64)
-    assert "with 64 steps: a: 1 rad and 2 rad; b: 3 rad and diverged" in answer_of(of)["i"]
-
-
 OFF = NumberRow(of="forearm", quantity="com", component="x", stated=2.0, compiled=2.5, difference=0.5, unit="m")  # fmt: skip
 SAME = replace(OFF, compiled=2.0, difference=0.0)
 STEP = LimitRow(scene="s", engine="tmt", method="rk4", damping=0.0, mode=9.0, limit="finite", predicted_dt=0.1,
@@ -198,6 +182,17 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
     assert found == numbers.split() and named in said, said
 
 
+def test_first_screen_of_several_experiments_has_the_answers_alone():
+    result = Result("stability", notes=[Finding("stability", "examined")])
+    result.top = [result.finding(kind) for kind in ("limits_at", "answer", "rest", "cures")]
+    several, alone = (
+        section_with("stability", result, ARM).result,
+        section_with("stability", result, ARM, True).result,
+    )
+    assert [text.kind for text in several.top] == ["answer", "cures"] and alone.top == result.top
+    assert [text.kind for text in several.notes] == ["limits_at", "rest", "examined"]
+
+
 def timed(engine, method, seconds, error, **more):
     return SpeedRow("s", engine, method, seconds=seconds, worst_error=error, **{"diverged": False} | more)
 
@@ -208,21 +203,6 @@ def marks(experiment, result, robot=ARM):
     lines = [line for line in figure.axes[0].get_lines() if line.get_marker() not in (None, "None", "")]
     points = [(line, float(x)) for line in lines for x in line.get_xdata()]
     return {(line.get_marker(), to_hex(line.get_color()), x) for line, x in points}
-
-
-def test_the_agreement_is_the_largest_of_all_rows_of_a_quantity_and_its_picture_says_whose_distance_is_whose():
-    near, other = replace(AGREED, mujoco_from_exact=None), replace(AGREED, quantity="other", difference=9.0)
-    rows = [near, replace(near, difference=7.0, from_exact=None), other]
-    (found,) = figures_of_states.agreements({"mass": Result("mass", rows=rows)})
-    distances = {"difference": 7.0, "from_exact": 1.0, "mujoco_from_exact": None}
-    assert found == {"name": "mass matrix M", "passed": True} | distances
-    _, _, caption = figures_of_states.draw_agreement({"mass": Result("mass", rows=rows)})
-    assert "Maximum difference: 7 eps" in say(caption)
-    rows.append(replace(AGREED, difference=float("nan"), passed=False))
-    (found,) = figures_of_states.agreements({"mass": Result("mass", rows=rows)})
-    assert found["difference"] == float("inf") and not found["passed"]
-    drawn = marks("mass", Result("mass", rows=[AGREED]))
-    assert drawn == {("D", to_hex("black"), 2.0), ("o", to_hex(BLUE), 1.0), ("s", to_hex(ORANGE), 4.0)}
 
 
 def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_named():
@@ -236,16 +216,5 @@ def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_n
     assert conclusions.reaching(rows[4:5], conclusions.TARGET) == []  # just outside of the error asked for
     rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt=0.00244140625, steps=2048))
     rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    assert conclusions.cheapest_settings(result) == [rows[-2], rows[2]]
+    assert conclusions.cheapest_settings(result)["settings"] == [rows[-2], rows[2]]
     assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
-
-
-def test_limits_are_counted_and_drawn_where_they_are_predicted_and_observed():
-    row = replace(STEP, damping=0.5)
-    schemes = {("tmt", "rk4"): "rk4", ("mujoco", "RK4"): "rk4"}
-    mujoco = replace(row, engine="mujoco", method="RK4", observed_dt=0.0995, passed=False)
-    rows = [row, mujoco, replace(row, scene="saddle")]
-    result = StabilityResult("stability", rows=rows, centres=("s",), schemes=schemes)
-    values = stability.headline(result).values
-    assert values == {"limits": 2, "known": 2, "wrong": 1, "off": pytest.approx(0.005)}
-    assert {("o", to_hex(BLUE), 0.1001), ("X", to_hex(RED), 0.0995)} <= marks("stability", result)

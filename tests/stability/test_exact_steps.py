@@ -9,9 +9,9 @@ from small import INERTIA, KINDS, LEG, hinge, limit_of, place_of, rest_of, spher
 
 from compare.engines.mujoco.forces import forces_near
 from compare.engines.mujoco.names import INTEGRATORS
+from compare.engines.mujoco.step import REMEMBERED
 from compare.stability.closed_form import matrix, radius_apart
 from compare.stability.growth import growth
-from compare.stability.place import in_the_air_at
 
 SAME = 1e-6  # of the largest entry of a step: central differences, and steps of RK4 that are no linear map
 EVERY = ("Euler", "implicitfast", "implicit", "RK4")
@@ -31,10 +31,6 @@ def test_the_limit_of_a_sphere_on_a_plane_is_known_to_seven_digits(dampratio, in
     assert sizes[0] < -1e-7 and sizes[1] > 1e-7
     found = limit_of(text, integrator, 0.005)
     assert found.kind == "finite" and found.dt == pytest.approx(x * 0.02, rel=3e-3)
-
-
-def test_the_limit_of_a_critically_damped_sphere_under_rk4_is_that_of_a_decay():
-    assert limit_of(sphere(), "RK4", 0.005).dt == pytest.approx(2.785293563 * 0.02, rel=3e-3)
 
 
 def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
@@ -78,6 +74,18 @@ def test_limits_of_one_hinge_are_those_of_the_formula():
     assert limit_of(hinge(actuator=exactly), "implicitfast").dt > 0.05
 
 
+@pytest.mark.skipif(not REMEMBERED, reason="this MuJoCo knows neither delays nor springs that yield")
+def test_a_delay_of_constant_controls_and_springs_that_do_not_yield_change_no_limit():
+    servo = '<position joint="turn" kp="20" kv="1"{}/>'
+    late, plain = (hinge(actuator=servo.format(more)) for more in (' delay="0.004" nsample="4"', ""))
+    spring = 'stiffness="3" springref="20"'
+    yielding, elastic = (
+        plain.replace('name="turn"', f'name="turn" {spring}{more}') for more in (' springyield="9"', "")
+    )
+    for text, same in ((late, plain), (yielding, elastic)):
+        assert limit_of(text, "implicitfast").dt == pytest.approx(limit_of(same, "implicitfast").dt)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_closed_form_is_the_derivative_of_mujocos_own_step(kind):
     place, known = place_of(KINDS[kind]), 0
@@ -108,15 +116,6 @@ def test_no_closed_form_of_discrete_or_at_the_edge_of_a_limit():
     assert radius_apart(rest_of(touching), place_of(touching).tree) is None
 
 
-@pytest.mark.parametrize("kind", ["friction loss", "elliptic, condim 3"])
-def test_no_closed_form_of_what_the_noslip_solver_changes(kind):
-    """It takes R out of the rows of friction, in a few iterations: their forces are others."""
-    text = KINDS[kind].replace("<option ", '<option noslip_iterations="3" ')
-    rest, tree = rest_of(text), place_of(text).tree
-    ours = matrix(rest, tree, forces_near(rest.step, rest.state))
-    assert abs(size(ours) - size(rest.A)) > 1e-3 and radius_apart(rest, tree) is None
-
-
 def test_activations_are_left_out_of_rk4_on_both_sides_and_none_that_moves_with_the_joint():
     # its activation has the eigenvalue 1
     turning = '<intvelocity joint="turn" kp="20" kv="5" actrange="-1 1"/>'
@@ -135,16 +134,6 @@ def test_a_wrong_mass_is_seen_in_the_closed_form():
     assert abs(radius_apart(rest, place.tree)) < 1e-8
     forces = forces_near(rest.step, rest.state)
     assert np.abs(matrix(rest, heavy, forces) - rest.A).max() > 1e-6
-
-
-def test_noise_of_differences_and_what_nothing_holds_never_grow():
-    """Sliding, yaw, a free caster and its wheel: eigenvalues 1, twice each."""
-    for text in (KINDS["a box"], KINDS["a free caster"]):
-        for integrator in EVERY:
-            for dt in (1e-4, 2e-3, 0.05):
-                assert growth(rest_of(text, dt, integrator)).factor == 1.0
-        assert limit_of(text).growth.factor == 1.0  # its contacts may give way, at a long step
-    assert in_the_air_at(place_of(KINDS["a box"])).surroundings == "air"
 
 
 @pytest.mark.parametrize("noise, factor", [(0.0, 1.0002), (1e-6, 1.0002), (4e-5, 1.0)])

@@ -11,7 +11,6 @@ from trees import exact_swing
 
 import tmt
 from compare.robots.arm import ARM
-from compare.robots.coordinates import floats
 from compare.stability.held import Held, held, holding, moving, posture_names, slopes
 from compare.truth.pendulum import pendulum, swing
 from tmt import METHODS
@@ -94,14 +93,6 @@ def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots):
     for method, limit in (("rk4", 2.785293563), ("explicit_euler", 2.0)):
         assert at.limit(method) == ("finite", pytest.approx(limit / 3.0, rel=1e-6))
     assert at.limit("semi_implicit_euler") == ("never_fails", None)
-
-
-def test_a_free_body_is_held_without_gravity_and_no_mode_of_it_grows(robots):
-    assert floats(robots["free_body"].tree) and not floats(robots["pendulum"].tree)
-    at = held(robots["free_body"], "qpos0")
-    assert not at.case.scene.gravity and not at.tau.any() and at.stays and at.without_stiffness.all()
-    for method in ("rk4", "semi_implicit_euler", "gauss_legendre_4"):
-        assert at.limit(method) == ("never_fails", None)
 
 
 def test_the_swing_is_its_elliptic_function():

@@ -1,6 +1,5 @@
 """Where a model rests: what falls, is left, is told; and what limits its step there."""
 
-import mujoco
 import numpy as np
 import pytest
 from small import BOX, CASTER, INERTIA, KINDS, LEG, STANDING, hinge, limit_of, place_of, rest_of
@@ -67,14 +66,6 @@ def test_what_falls_has_no_rest_and_one_in_the_air_has():
     assert in_the_air_at(place_of(hinge())) is None  # nothing touches it, and it rests
 
 
-def test_what_floats_without_gravity_turns_and_does_not_fall():
-    key = '</worldbody><keyframe><key qvel="0 0 0 0 0 90"/></keyframe>'
-    floating = place_of(
-        STONE.replace("timestep", 'gravity="0 0 0" timestep').format("").replace("</worldbody>", key)
-    )
-    assert np.abs(floating.moved).max() > 0.5 and not floating.has_fallen
-
-
 def test_in_the_air_a_base_that_would_fall_has_no_weight_and_a_fixed_one_has():
     """A base falls that has a free joint, or slides downwards with nothing on its joint."""
     hanging = LEG.replace('name="lift"', 'name="lift" stiffness="900"')
@@ -106,16 +97,6 @@ def test_all_rows_of_a_contact_are_its_own(cone, counts):
         assert rows_at(rest.step, rest.state)[1].contact.tolist() == [0] * count
     rest = rest_of(KINDS["a limit"])
     assert rows_at(rest.step, rest.state)[1].contact.tolist() == [-1]
-
-
-def test_the_steps_of_a_model_share_a_copy_and_each_has_its_own_options():
-    model = mujoco.MjModel.from_xml_string("<mujoco><option tolerance='1e-4'/></mujoco>")
-    exact, other = Step(model, 0.01, "Euler"), Step(model, 0.02, "RK4", exact=False)
-    assert exact.model is other.model is not model
-    for step, expected in ((exact, (0.01, 1e-15)), (other, (0.02, 1e-4))):
-        step.set_options()
-        assert (step.model.opt.timestep, step.model.opt.tolerance) == expected
-    assert (model.opt.timestep, model.opt.tolerance) == (0.002, 1e-4)
 
 
 def test_a_relaxed_run_loses_its_speed_whether_anything_brakes_or_not():

@@ -18,18 +18,19 @@ from compare.engines.mujoco.variants import (
 )
 from compare.stability import cures
 from compare.stability.control import controlled
-from compare.stability.growth import growth, has_grown, push_of
+from compare.stability.growth import growth, push_of
 from compare.stability.limits import Tried, tried
 from compare.stability.motion import motion
-from compare.stability.runs import PUSHES, USUAL_PUSH, WAYS, Runs, Shown, lasting, upwards
+from compare.stability.runs import USUAL_PUSH, WAYS, Runs, Shown, lasting, upwards
 
 WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
-RUBBING = hinge(20.0, 30.0, 'frictionloss="0.3"')
 MOTORS = '<motor joint="turn" gear="2"/>'
 SPIN = """<mujoco><option timestep="0.01" gravity="0 0 0"/><worldbody><body><freejoint/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.02 0.03"/></body></worldbody>
   <keyframe><key qvel="0 0 0 0 {} 0"/></keyframe></mujoco>"""
+
+
 SWING = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="a" axis="0 1 0" {}/>
   <geom size="0.05" pos="0 0 -0.5" mass="1"/></body></worldbody><keyframe><key qvel="3"/></keyframe></mujoco>"""
 
@@ -61,26 +62,6 @@ def test_a_step_is_stable_at_a_rest_nearby_where_nothing_grows_faster_than_what_
     usual = {"rest": SimpleNamespace(is_found=True), "growth": SimpleNamespace(rate=0.09)}
     usual |= {"dt": 0.1, "drift": 0.0, "moved": 0.29}
     assert Tried(**usual | more).is_stable is stable
-
-
-@pytest.mark.parametrize(
-    "late, steps, grown", [(2.9, 100, False), (3.1, 100, True), (np.nan, 100, True), (1.0, 101, True)]
-)
-def test_a_push_has_grown_if_its_last_quarter_is_three_times_its_second(late, steps, grown):
-    sizes = 1e-7 * np.r_[np.full(75, 1.0), np.full(25, late)]
-    assert has_grown(sizes, steps) is grown
-
-
-def test_dry_friction_holds_small_deviations_alone():
-    """Without it the limit is that of the formula; between the two only small pushes are survived."""
-    place = place_of(RUBBING)
-    smooth = (-30.0 + np.sqrt(30.0**2 + 4.0 * INERTIA * 20.0)) / 20.0
-    assert limit_of(RUBBING).dt > 4.0 * smooth
-    free = place.frictionless
-    assert not free.dof_frictionloss.any() and place_of(hinge()).frictionless is None
-    assert [tried(free, place.rest, by * smooth, "Euler").is_stable for by in (0.99, 1.01)] == [True, False]
-    pushes = [runs_of(RUBBING).largest_push(by * smooth) for by in (0.9, 1.5)]
-    assert pushes[0] == (PUSHES[0], None) and 0.0 < pushes[1][0] < 0.1 and not pushes[1][1]
 
 
 def test_a_servo_too_weak_for_a_push_bears_it_at_no_step():
@@ -234,15 +215,6 @@ def test_runs_show_the_longest_period_and_the_longest_delay_of_two_servos(delay)
     assert latest >= delay and grown == [False, True]
 
 
-def test_a_program_that_is_late_may_be_stable_where_one_in_time_is_not():
-    """Its force acts over the end of one period and the beginning of the next: then the limits are sought beyond."""
-    found = program(hinge(20.0, 1.6))
-    steps = next(steps for steps in range(1, 99) if found.factor(steps, 0) > 1.0)
-    late = next(delay for delay in range(1, steps) if found.factor(steps, delay) == 1.0)
-    assert exact_growth(steps, 0, 20.0, 1.6) > 1.0 >= exact_growth(steps, late, 20.0, 1.6) - 1e-9
-    assert found.longest_delay(steps, late) >= late and found.longest_period(late, steps) >= steps
-
-
 def test_a_force_range_and_the_rest_of_a_program_are_those_of_the_file():
     """Two rods on their servos: the program's forces hold them where MuJoCo's did."""
     text = two()
@@ -267,16 +239,6 @@ def test_a_body_that_spins_about_its_middle_axis_leaves_by_itself():
         assert found.rate == pytest.approx(found.exact_rate, rel=0.05)
         rates.append(found.exact_rate)
     assert rates[1] - rates[0] == pytest.approx(20.0 / np.sqrt(3.0), rel=0.1)
-
-
-@pytest.mark.parametrize("joint, dt, integrator, stable", [
-    ("", 0.01, "Euler", True), ('stiffness="400"', 0.01, "Euler", True), ('stiffness="400"', 0.2, "Euler", False),
-    ('damping="40"', 0.05, "Euler", True), ('damping="40"', 0.05, "RK4", False),
-])  # fmt: skip
-def test_a_swing_grows_by_its_step_alone_where_the_exact_motion_does_not(joint, dt, integrator, stable):
-    place = place_of(SWING.format(joint))
-    found = motion(place, dt, integrator)
-    assert found.passed is stable and (found.failed_at is None) is stable
 
 
 # cures

@@ -1,14 +1,16 @@
-"""The answer for a file: rows of step limits, for reports and for scripts."""
+"""The answer for a file: rows of step limits, for reports and for scripts, and the step from the posture itself."""
 
 import mujoco
 import numpy as np
 import pytest
-from small import HOLDING, INERTIA, KINDS, LEG, STANDING, hinge, two
+from small import HOLDING, INERTIA, LEG, STANDING, hinge, two
 
 import compare
 from compare.engines.mujoco.reading import read
+from compare.experiments.stability import own_run
 from compare.stability.answer import Asked, StepLimitRow, answers
-from compare.stability.place import posture_of, postures_of
+from compare.stability.place import Posture, posture_of, postures_of
+from compare.stability.start import StartRuns
 
 KEYS = '<keyframe><key name="low" qpos="0.3 -0.2"/><key qpos="0 0"/></keyframe>'
 FOOT = STANDING.format(cone="elliptic", condim=3)
@@ -43,12 +45,6 @@ def test_rows_tell_of_the_robot_in_contact_and_in_the_air():
     assert fast.creep > 1e-6 and fast.creeping_joint
 
 
-def test_runs_stand_beside_the_limit_where_they_are_asked_for():
-    (row,) = compare.step_limits(two(), integrators=["Euler"], in_runs=True)
-    assert row.observed_dt < row.predicted_dt < row.failing_dt < 1.07 * row.observed_dt
-    assert row.largest_push == 1.0 and not row.decided_by_runs and row.smooth_dt is None
-
-
 @pytest.mark.parametrize("asked, q", [
     ("low", ()), ("qpos0", ()), ("10,-20", np.radians([10, -20])), ((10, -20), np.radians([10, -20])),
 ])  # fmt: skip
@@ -66,14 +62,6 @@ def test_a_wrong_posture_is_one_line(asked):
     ) as caught:
         compare.step_limits(two(HOLDING + KEYS), posture=asked)
     assert "\n" not in str(caught.value)
-
-
-def test_postures_differ():
-    text = two(HOLDING.replace("60", "600") + KEYS)
-    postures = None, "low", "17.18873,-11.45916", (0, 90)
-    limits = [compare.step_limits(text, posture=p, integrators=["Euler"])[0] for p in postures]
-    first, low, numbers, bent = (row.predicted_dt for row in limits)
-    assert first == low == pytest.approx(numbers, rel=5e-3) and abs(bent / low - 1.0) > 0.05
 
 
 NEAR, OFF = {"observed_dt": 0.0097, "failing_dt": 0.0103}, {"observed_dt": 0.0094, "failing_dt": 0.0103}
@@ -121,7 +109,40 @@ def test_the_limit_without_dry_friction_stands_beside_that_with_it():
     assert row.predicted_dt > 4.0 * row.smooth_dt and row.is_held_by_friction
 
 
-def test_every_kind_of_force_has_an_answer():
-    for kind in ("a muscle", "a DC motor", "fluid", "a loaded loop", "a free caster"):
-        rows = compare.step_limits(KINDS[kind], integrators=["implicitfast"])
-        assert all(row.is_known for row in rows), kind
+# an inverted pendulum that leans on one of two stops; the deeper it starts in a stop, the more that one throws it
+TIPPING = """<mujoco><compiler angle="radian"/><option timestep="{dt}"><flag refsafe="disable"/></option><worldbody><body>
+  <joint name="tip" axis="0 1 0" range="-0.5 0.5" solreflimit="0.02 1" damping="0.02"/>
+  <geom size="0.1" pos="0 0 0.5" mass="1"/></body></worldbody><keyframe><key name="lean" qpos="{q}"/></keyframe></mujoco>"""
+LEAN = Posture("lean", "lean")
+GO = 0.01  # s
+
+
+def starts(q, dt=GO):
+    return StartRuns(read(TIPPING.format(dt=dt, q=q)), LEAN, "Euler")
+
+
+@pytest.mark.parametrize("q, outcome", [(0.55, "calm"), (0.8, "alike"), (1.2, "worse")])
+def test_a_run_that_comes_to_rest_elsewhere_is_stable_only_if_a_finer_step_leads_there_too(q, outcome):
+    reading = read(TIPPING.format(dt=GO, q=q))
+    row = own_run.own_run("lean", reading.dt, reading.integrator, reading)
+    assert row.full_model_calm and row.outcome == outcome
+    assert row.rests_elsewhere is (outcome != "calm") and not row.has_fallen
+    expected = (1.0, "tip") if row.rests_elsewhere else (0.0, "tip")
+    assert (row.moved, row.moved_joint) == (pytest.approx(expected[0], abs=0.01), expected[1])
+
+
+def test_the_longest_step_from_the_posture_itself_is_where_its_runs_change():
+    for first in (1e-3, GO):  # from below and from above
+        runs = starts(1.2)
+        longest = runs.longest(first, 0.017)
+        assert 2e-3 < longest < GO and runs.rests(longest) and not runs.rests(GO)
+    assert starts(0.55).longest(1e-3, 0.01) is None  # not below the limit
+    assert starts(0.8).longest(1e-3, 0.017) is None  # at no step
+
+
+def test_a_row_has_the_step_from_the_posture_beside_its_limit_where_it_is_lower():
+    for q, lower in ((1.2, True), (0.52, False)):
+        reading = read(TIPPING.format(dt=1e-3, q=q))
+        (row,) = answers(LEAN, reading, Asked(1e-3, "Euler", ["Euler"]), air=False)[0].rows
+        assert row.stable_at_file_dt and (row.start_dt is not None) is lower
+        assert not lower or row.start_dt < 0.97 * row.longest

@@ -99,16 +99,6 @@ def test_threads_change_no_bit(monkeypatch, rng):
         assert all(pool.map(ask, range(8)))
 
 
-@pytest.mark.parametrize("convert", [np.ndarray.tolist, np.float32, lambda a: a[..., ::-1].copy()[..., ::-1]])
-def test_numbers_in_any_form_are_taken(convert):
-    compiled(tmt.ARM, "acceleration")
-    q, qd, tau = np.random.default_rng(0).integers(-8, 9, (3, 5, 3)) / 8.0
-    expected = tmt.acceleration(q, qd, tau)
-    q.flags.writeable = False
-    assert np.array_equal(tmt.acceleration(convert(q), convert(qd), tau), expected)
-    assert np.array_equal(tmt.acceleration(convert(q[0]), convert(qd[0]), tau[0]), expected[0])
-
-
 BALL = one_body(np.eye(3), ["ball"], com=(0, 0, 0.1))
 WRIST, Z = dataclasses.replace(wrist(), inertia=[np.eye(3)]), np.zeros(3)
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)
@@ -137,12 +127,6 @@ def test_what_is_wrong_is_said_in_the_same_words(model, given):
     assert "'a', 'c'" in str(found.value) or getattr(model, "body_names", ()) != ("hand",)
 
 
-def test_what_is_within_a_millionth_of_a_unit_quaternion_is_one():
-    compiled(BALL)
-    for q in (TURNS[0], TURNS):
-        assert np.isfinite(tmt.acceleration(q * (1.0 + 0.99e-6), Z, Z, BALL)).all()
-
-
 @pytest.mark.filterwarnings("error")
 def test_numbers_beyond_the_largest_double():
     compiled(tmt.ARM, "mass_matrix", "energy")
@@ -153,18 +137,6 @@ def test_numbers_beyond_the_largest_double():
             tmt.potential_energy(q, slide)
     for qd in (np.full(3, 1e200), np.full((2, 3), 1e200)):
         assert np.array_equal(tmt.energy(Z, qd), literal.energy(Z, qd)) and np.isinf(tmt.energy(Z, qd)).all()
-
-
-def test_who_cannot_wait_has_it_prepared(monkeypatch):
-    tree = tmt.ARM.lock({"alpha": 0.0, "beta": 0.5})
-    tmt.prepare(tree, "bias")
-    assert set(answers.answers_of(tree).prepared) == {"bias"}
-    with pytest.raises(ValueError, match="'weight'"):
-        tmt.prepare(tree, "weight")
-    assert tmt.prepare(tree) is None
-    assert {*answers.answers_of(tree).prepared} == {x for x in PLAIN if not QUANTITIES[x].is_long}
-    monkeypatch.setattr(literal, "acceleration", None)
-    assert np.isfinite(tmt.acceleration(Z[:1], Z[:1], Z[:1], tree)).all()
 
 
 def test_a_short_question_never_waits_for_a_compiler():

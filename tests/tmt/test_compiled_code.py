@@ -1,7 +1,8 @@
-"""Compiled quantities: the same bits side by side as one at a time, derivatives, sines. Their numbers see test_answers."""
+"""Compiled quantities and runs: the same bits side by side, in threads and alone. The numbers of quantities see test_answers."""
 
 import ctypes
 import math
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -10,14 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from trees import random_state, random_states, small_tree
 
+import tmt
 from tmt import literal
-from tmt.compiled import Evaluator, forms
+from tmt.compiled import Evaluator, forms, runner, runs, straight
 from tmt.compiled.ir import POINTER, Code, module
 from tmt.compiled.machine import Library
+from tmt.compiled.runner import Runner
 from tmt.compiled.straight import LIMIT, functions, trace
 from tmt.derivation.dual import jacobian
 from tmt.derivation.vectors import cos, sin
-from tmt.methods import METHODS
+from tmt.methods import METHODS, one_step
 
 EPS = np.finfo(float).eps
 SMALL = small_tree()
@@ -85,3 +88,79 @@ def test_sine_and_cosine_to_the_last_digit(x):
 @pytest.mark.parametrize("x", [math.nextafter(LIMIT, math.inf), -1e300, -np.inf, np.nan])
 def test_no_sine_beyond_the_limit(x):
     assert np.isnan(sincos([x])).all() and np.isfinite(sincos([math.copysign(LIMIT, x)])).all()
+
+
+FREE = replace(SMALL, position_gain=(), speed_gain=())  # without a controller
+LARGER = ("implicit", SMALL), ("implicit", FREE), ("implicit_midpoint", SMALL)
+
+
+def starts(count) -> list[np.ndarray]:
+    return random_states(np.random.default_rng(0), SMALL, count)
+
+
+def paths_from(q, qd, steps) -> list[np.ndarray]:
+    paths = [np.full((len(x), steps + 1, x.shape[1]), np.nan) for x in (q, qd)]
+    paths[0][:, 0], paths[1][:, 0] = q, qd
+    return paths
+
+
+def assert_is_the_step(name, q, qd, tau, dt, tree=SMALL):
+    """The first run is that of the method over floats."""
+    state = q[0, 0].tolist(), qd[0, 0].tolist()
+    for k in (1, 2):
+        state = one_step(METHODS[name], tree, *state, tau[0].tolist(), dt)
+        assert np.allclose(q[0, k], state[0], rtol=0, atol=1e-11)
+        assert np.allclose(qd[0, k], state[1], rtol=0, atol=1e-10)
+
+
+# the steps of the others are compiled in the same way, and engines/test_contract.py follows the arm by them
+@pytest.mark.parametrize("name, counts", [
+    ("rk4", (*range(1, 10), 17)), ("implicit", (4, 9)), ("implicit_midpoint", (1, 3)), ("dopri8_adaptive", (1, 3)),
+])  # fmt: skip
+def test_runs_together_have_the_bits_of_each_alone(name, counts):
+    """Two of them diverge, one at once; some batches are no multiple of what a register holds."""
+    most, dt = counts[-1], 0.3 if METHODS[name].adaptive else 0.02  # of the steps of its own some are refused
+    q, qd, tau = starts(most)
+    qd[1], tau[most // 2 + 1] = 1e200, 1e300
+    alone = [tmt.simulate(*run, dt, 6, name, SMALL) for run in zip(q, qd, tau)]
+    for count in counts:
+        batch = tmt.simulate(q[:count], qd[:count], tau[:count], dt, 6, name, SMALL)
+        assert np.array_equal(batch.q, [one.q for one in alone[:count]], equal_nan=True)
+        assert np.array_equal(batch.qd, [one.qd for one in alone[:count]], equal_nan=True)
+        assert batch.ended.tolist() == [one.ended for one in alone[:count]]
+        assert batch.evaluations == sum(one.evaluations for one in alone[:count])
+    assert [k for k in range(most) if batch.ended[k]] == [1, most // 2 + 1]
+    third = tmt.simulate(q, qd, tau, dt, 6, name, SMALL, every=3)
+    assert np.array_equal(third.t, batch.t[::3])
+    assert all(np.array_equal(x[:, ::3], y, equal_nan=True) for x, y in zip(batch[1:], third[1:]))
+    assert batch.evaluations == third.evaluations and np.array_equal(batch.ended, third.ended)
+    if not METHODS[name].adaptive:
+        assert_is_the_step(name, batch.q, batch.qd, tau, dt)
+
+
+@pytest.mark.parametrize("name, tree", LARGER)
+def test_the_code_of_larger_trees_does_the_same(name, tree, folder, monkeypatch):
+    """Linear systems and derivatives by calls, articulated bodies, no lines in the place of a call, lines cut into parts."""
+    monkeypatch.setattr(forms, "DENSE", 0)
+    monkeypatch.setattr(runs, "INLINED", 0)
+    monkeypatch.setattr(forms, "FORMS", forms.FORMS[1:2])
+    monkeypatch.setattr(straight, "LONGEST", 50)
+    q, qd, tau = starts(9)
+    (q, qd), other = paths_from(q, qd, 3), paths_from(q[4:5], qd[4:5], 3)
+    for paths, torque in (((q, qd), tau), (other, tau[4:5])):
+        Runner(tree, METHODS[name]).follow(*paths, torque, 0.02, 0.0, 1)
+    assert np.array_equal(q[4], other[0][0]) and np.array_equal(qd[4], other[1][0])
+    assert_is_the_step(name, q, qd, tau, 0.02, tree)
+
+
+def test_several_cores_give_the_bits_of_one(monkeypatch):
+    q, qd, tau = starts(75)
+    qd[40] = 1e200
+    monkeypatch.setattr(runner, "SPREAD", 0)
+    for name in ("rk4", "implicit_midpoint"):
+        monkeypatch.setattr(runner, "cores", lambda: 1)
+        one = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
+        monkeypatch.setattr(runner, "cores", lambda: 3)
+        three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three)) and one.ended[40]
+        assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended)

@@ -122,15 +122,6 @@ def test_code_is_run_that_nobody_else_can_have_put_there(folder, tmp_path, monke
     assert stat.S_IMODE(file.stat().st_mode) & 0o077 == 0
 
 
-def test_a_damaged_file_is_written_anew(folder):
-    assert is_kept(folder)
-    (file,) = files(folder)
-    whole = file.read_bytes()
-    for damaged in (b"", whole[:-10], whole[:200] + whole[201:]):
-        file.write_bytes(damaged)
-        assert asked() == 3.0 and file.read_bytes() == whole
-
-
 def test_a_full_disk_or_a_folder_that_cannot_be_made_only_costs_time(folder, monkeypatch):
     def full(*_):
         raise OSError("no space")
@@ -140,27 +131,3 @@ def test_a_full_disk_or_a_folder_that_cannot_be_made_only_costs_time(folder, mon
     (folder / "file").write_text("")
     monkeypatch.setenv("TMT_CACHE", str(folder / "file" / "cache"))
     assert asked() == 3.0
-
-
-PROGRAM = "import numpy, tmt; print(tmt.potential_energy(numpy.linspace(-1.0, 1.0, 2700).reshape(900, 3)).sum().hex())"
-NO_COMPILER = "from tmt.compiled import store; store.object_code = None; "
-
-
-@posix
-def test_processes_share_what_they_compile(tmp_path):
-    """In any path, where Python takes every text for ASCII, and nothing is left elsewhere."""
-    folder, home = tmp_path / os.fsdecode("Zwischenlager für Übersetztes".encode()), tmp_path / "home"
-    home.mkdir()
-    environment = {
-        "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONDONTWRITEBYTECODE": "1",
-        "PYTHONPATH": str(ROOT), "TMT_CACHE": str(folder), "HOME": str(home), "PATH": os.environ["PATH"],
-    }  # fmt: skip
-
-    def output(program):
-        command = [sys.executable, "-c", program]
-        run = subprocess.run(command, env=environment, cwd=home, capture_output=True, text=True)
-        return run.stdout, run.stderr
-
-    first, errors = output(PROGRAM)
-    assert first and errors == "" and output(NO_COMPILER + PROGRAM) == (first, "") and len(files(folder)) == 1
-    assert not list(home.iterdir())

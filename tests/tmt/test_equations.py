@@ -63,15 +63,6 @@ def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_cha
 
 
 @of_trees
-def test_gravity_and_springs_are_the_slope_of_the_potential_energy(drawn):
-    tree, q, qd, *_ = drawn
-    held = tmt.gravity_balance(q, tree) + tmt.spring_torque(q, tree)
-    slope = by_each(tree, lambda q: tmt.potential_energy(q, tree), q)
-    assert_close(slope, held, 1.0 + abs(tmt.potential_energy(q, tree)))
-    assert_close(tmt.bias(q, 0.0 * qd, tree), tmt.gravity_balance(q, tree), 100.0, 64 * EPS)
-
-
-@of_trees
 def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
     tree, q, qd, *_ = drawn
 
@@ -100,15 +91,6 @@ def test_composite_and_articulated_bodies_give_the_numbers_of_the_literal_sums(d
     force = method.reduced_force(tree, [0.0] * len(qd), q, qd, tau)
     qdd = np.array(articulated.acceleration(tree, q, qd, force))
     assert_close(M @ qdd, force - h, np.abs(M).max() * np.abs(qdd).max(), 1e-12)
-
-
-@of_trees
-def test_the_rates_of_the_bias_are_its_derivatives_by_the_speeds(drawn):
-    """The bias has squares of the speeds, of which central differences of any step are exact."""
-    tree, q, qd, *_ = drawn
-    ends = [tmt.bias(q, qd + sign * np.eye(len(qd)), tree) for sign in (1.0, -1.0)]
-    expected = np.subtract(*ends).T / 2.0
-    assert_close(method.bias_rates(tree, q.tolist(), qd.tolist()), expected, np.abs(ends).max(), 256 * EPS)
 
 
 @settings(max_examples=20)

@@ -1,20 +1,25 @@
-"""The true motion: beside closed forms, a short run in many digits, and its own second run."""
+"""Motions: what simulate gives back and why a run ended; the true motion beside closed forms and many digits."""
 
+import copy
 import dataclasses
+import pickle
 from fractions import Fraction
 
 import mpmath
 import numpy as np
 import pytest
 from models import PATHS
-from trees import exact_swing, one_body, random_state, small_tree, tree_of_kinds
+from trees import exact_swing, one_body, random_state, small_tree, tree_of_kinds, wrist
 
+import tmt
 from compare.engines.mujoco import read
 from tmt.derivation import composite
 from tmt.derivation.method import acceleration
 from tmt.exact import motion as reference_run
 from tmt.exact.motion import trajectory, truth
 from tmt.exact.tree import exact_tree, of_length_1
+from tmt.methods import METHODS, one_step
+from tmt.simulation import reasons, singular_in
 
 DIGITS = 32
 
@@ -83,16 +88,6 @@ def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
         assert off(path, [*position, *quaternion, *speed, *omega], k) < 1e-29
 
 
-def test_times_are_exact_multiples_of_the_step():
-    """A slide without force moves by speed times time: 0.1, 0.3, 0.7 are not what their doubles are."""
-    tree = one_body([(0.0, 1.0, 0.0)], ["slide"], gravity=(0.0, 0.0, 0.0))
-    path = trajectory(tree, [0.3], [0.7], [0.0], 0.1, 21, every=3)
-    assert path.high.shape == (8, 2) and path.steps == 1
-    for k, (high, low) in enumerate(zip(path.high[:, 0].tolist(), path.low[:, 0].tolist())):
-        expected = Fraction(0.3) + Fraction(0.7) * 3 * k * Fraction(0.1)
-        assert abs(Fraction(high) + Fraction(low) - expected) < Fraction(1, 10**31)
-
-
 @pytest.mark.parametrize("tree", [small_tree(), tree_of_kinds(np.random.default_rng(1), bodies=1)])
 def test_trees_of_every_kind_beside_a_short_run_in_many_digits(tree, rng):
     """Balls, slides and free joints, springs, armature, damping, axes to the last digit, a controller."""
@@ -116,3 +111,91 @@ def test_two_runs_of_other_forms_and_orders_agree_and_a_seeded_error_sets_them_a
 
     monkeypatch.setitem(reference_run.FORMS, "literal", wrong)
     assert truth(tree, *start, 0.0625, 4)[1] > 1e-20
+
+
+BENT = np.radians([30.0, 20.0, 60.0])
+REST = np.zeros(3)
+FAST = 2.0**49 - 1.0
+ENDS = {
+    "overflow": ("rk4", (BENT, REST, [1e308] * 3), {}, "diverges"),
+    "diverged": ("rk4", (BENT, [1e3] * 3, REST), {"dt": 10.0}, "diverges"),
+    "turned": ("rk4", ([FAST, 0, 0], [50, 0, 0], REST), {}, "2^49"),
+    "adaptive, turned": ("dopri8_adaptive", ([FAST, 0, 0], [50, 0, 0], REST), {}, "2^49"),
+    "too small a tolerance": ("dopri8_adaptive", (BENT, REST, REST), {"tolerance": 1e-300}, "1e-300"),
+    "no stages": ("implicit_midpoint", (BENT, REST, REST), {"dt": 0.5}, "Newton"),
+    "singular": ("rk4", ([0.5, 0, 1], [1, 0, 0], REST), {"model": wrist()}, "'a', 'c'"),
+    "stages of a singular state": ("implicit_midpoint", (REST, [0.1, 0.2, 0.3], [1, 0, 0]), {"model": wrist()}, "'a', 'c'"),
+    "a series that overflows": ("taylor", (BENT, [1e200, -1e200, 0.0], REST), {}, ""),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("method, start, more, says", ENDS.values(), ids=ENDS)
+def test_a_run_says_why_it_ended(method, start, more, says):
+    """Alone, between the states that are kept, and among others, which go on."""
+    arguments = {"dt": 0.1, "steps": 200, "method": method} | more
+    motion = tmt.simulate(*start, **arguments)
+    last = int(np.isfinite(motion.q).all(axis=1).sum()) - 1
+    assert motion.ended.startswith(f"at t = {last * arguments['dt']:g} s") and says in motion.ended
+    assert 0 <= last < 200 and np.isnan(motion.q[last + 1 :]).all() and np.isnan(motion.qd[last + 1 :]).all()
+    some = tmt.simulate(*start, **arguments, every=40)
+    assert some.ended == motion.ended and np.array_equal(some.q, motion.q[::40], equal_nan=True)
+    rows = [np.array([value] * 9, dtype=float) for value in ([0.5, 1.0, 1.0], REST, REST)]
+    for row, value in zip(rows, start):
+        row[4] = value
+    short = arguments | {"steps": min(200, last + 2)}
+    if method == "rk4":
+        among = tmt.simulate(*rows, **short)
+        assert among.ended[4] == motion.ended
+        assert np.array_equal(among.q[4], motion.q[: short["steps"] + 1], equal_nan=True)
+        assert [k for k in range(9) if k != 4 and among.ended[k]] == [] or "dt" in more or "model" in more
+
+
+def test_where_newton_fails_one_step_is_an_error():
+    with pytest.raises(ArithmeticError, match="Newton's method"):
+        one_step(METHODS["implicit_midpoint"], tmt.ARM, BENT.tolist(), [1e6] * 3, [0.0] * 3, 10.0)
+
+
+def test_a_singular_state_before_the_rates_jump_is_found():
+    q, qd = np.zeros((1, 9, 3)), np.zeros((1, 9, 3))
+    q[0, :, 1] = [1.0, 0.8, 0.6, 0.4, 0.0, -0.4, -0.6, -0.8, -1.0]
+    qd[0, 5:] = 1.0
+    (why,) = reasons(wrist(), q, qd, np.zeros((1, 2), int), 0.1, 1e-9)
+    assert why.startswith("at t = 0.4 s: ") and "'a', 'c'" in why
+    assert np.isfinite(q[0, :, 0]).tolist() == [True] * 5 + [False] * 4
+
+
+def test_the_last_state_of_a_run_is_looked_at():
+    """The rates change most at the start, and the last state is the one at which Mbar is singular."""
+    q, qd = np.array([[0.5, 1.0, 1.0], [0.5, 0.5, 1.0], [0.5, 0.0, 1.0]]), np.zeros((3, 3))
+    qd[1:] = 1.0
+    assert singular_in(wrist(), q, qd)[0] == 2 and singular_in(wrist(), q[:2], qd[:2]) is None
+
+
+def test_a_motion_is_three_arrays_and_more():
+    motion = tmt.simulate(BENT, REST, REST, 0.1, 5)
+    t, q, qd = motion
+    assert len(motion) == 3 and motion[0] is motion.t is t and q is motion.q and qd is motion.qd
+    assert isinstance(motion, tuple) and motion.ended is None and motion.evaluations == 20
+    batch = tmt.simulate([[BENT, BENT]], [[REST, [1e200] * 3]], REST, 0.1, 5)
+    assert batch.evaluations == 4 * (5 + 1) and batch.ended.shape == (1, 2)
+    assert batch.ended[0, 0] is None and "2^49" in batch.ended[0, 1]
+    for again in (copy.deepcopy(batch), pickle.loads(pickle.dumps(batch))):
+        assert type(again) is tmt.Motion and again.evaluations == batch.evaluations
+        assert np.array_equal(again.ended, batch.ended)
+        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(again, batch, strict=True))
+
+
+def test_taylor_is_the_true_motion_of_each_run(rng):
+    starts, tau = rng.uniform(-1, 1, (2, 3)), rng.uniform(-1, 1, (2, 3))
+    motion = tmt.simulate(starts, REST, tau, 0.1, 6, "taylor")
+    assert motion.ended.tolist() == [None, None] and motion.evaluations >= 2
+    near = tmt.simulate(starts, REST, tau, 0.1 / 256, 6 * 256, "dopri8", every=256)
+    assert np.abs(near.q - motion.q).max() < 1e-13 and np.array_equal(near.t, motion.t)
+    assert np.array_equal(motion.q[:, 0], starts)
+    second = tmt.simulate(starts[1], REST, tau[1], 0.1, 6, "taylor", every=2)
+    assert np.array_equal(second.q, motion.q[1, ::2]) and second.ended is None
+    loose = tmt.simulate(starts, REST, tau, 0.5, 3, "taylor", tolerance=1e-6)
+    assert loose.evaluations < tmt.simulate(starts, REST, tau, 0.5, 3, "taylor").evaluations
+    stiff = dataclasses.replace(tmt.ARM, damping=(1e6, 0.0, 0.0))
+    assert "series" in tmt.simulate(BENT, REST, REST, 0.1, 5, "taylor", stiff).ended

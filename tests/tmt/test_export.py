@@ -12,11 +12,9 @@ from many_digits import FIELDS, exact
 from trees import random_states, random_tree, tree_of_kinds
 
 import tmt
-from tmt.compiled import forms, straight
 from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.exact.many import Pairs, exact_of_many
 from tmt.export import c
-from tmt.export.statements import Syntax, Writer
 
 HAS_C = bool(shutil.which("gcc"))
 
@@ -53,35 +51,6 @@ def test_python_gives_the_same_values(tree, name):
     states = states_of(tree)[: len(QUANTITIES[name].takes)]
     found, expected = module(tree, name)[name](*states), getattr(tmt, name)(*states, model=tree)
     assert near(*((x if isinstance(x, tuple) else (x,)) for x in (found, expected)))
-
-
-def test_python_takes_any_batch_and_refuses_other_shapes():
-    found = module(tmt.ARM, "bias")["bias"]
-    q, qd = np.linspace(-1.0, 1.0, 12).reshape(2, 2, 3), np.array([0.1, 0.2, 0.3])
-    assert near([found(q, qd)], [tmt.bias(q, qd)]) and found(q[0, 0], qd).shape == (3,)
-    with pytest.raises(ValueError, match="expected"):
-        found(q[..., :2], qd)
-
-
-def test_brackets_keep_the_order_of_operations():
-    def function(x):
-        a, b, c, d = x
-        return [a - (b - c), a / (b * c), a / (b / c), (a - b) * (c - d), -(a * b) - c, -(a - b), (a + b) / (c + d),
-                a * (b + c) - d * (a - c), -2.0 * a - -3.0 / b, 1.0 / (a - b)]  # fmt: skip
-
-    traced, values = straight.trace("f", (4,), function), [1.3, -0.7, 2.1, 0.9]
-    for number in (repr, lambda x: f"({x!r})"):
-        syntax, names = Syntax("", "{name} = {value}", "", number=number), dict(zip("abcd", values))
-        results = [f"out[{k}] = {{value}}" for k in range(len(traced.outputs))]
-        names["out"] = [None] * len(results)
-        exec("\n".join(line.text for line in Writer(traced, "abcd", results, syntax).lines), {}, names)
-        assert np.allclose(names["out"], function(values), rtol=1e-14)
-
-
-def test_the_header_has_the_sizes():
-    text = tmt.equations(TREES["kinds"], "c header", ["bias"])
-    sizes = TREES["kinds"].coordinates
-    assert f"robot_nq = {sizes.nq}, robot_nv = {sizes.nv} " in text and sizes.nq != sizes.nv
 
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")
@@ -201,22 +170,3 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
 def test_what_is_no_parameter(words, quantity, why):
     with pytest.raises(ValueError, match=why):
         tmt.equations(tmt.ARM, "c", [quantity], parameters=words)
-
-
-def test_each_quantity_has_the_fewest_operations_of_the_forms():
-    """A tree of short branches and long paths: Mbar in the frames of the joints, or in the axes of the world."""
-    kinds = set()
-    for tree in (random_tree(np.random.default_rng(1), bodies=24), TREES["kinds"], tmt.ARM):
-        n = len(tree.axis)
-
-        def length(form, part, tree=tree, n=n):
-            def function(q, qd):
-                return forms.flat(form.terms(tree, q, qd)[part])
-
-            return straight.trace("f", (tree.coordinates.nq, n), function).operations
-
-        for part, name in enumerate(("mass_matrix", "bias")):
-            counts = [length(form, part) for form in forms.FORMS]
-            assert forms.quantity(tree, name).operations <= min(counts)
-            kinds.add((name, int(np.argmin(counts)) == 0))
-    assert ("bias", True) in kinds

@@ -1,53 +1,37 @@
-"""Methods of integration: their tableaus, their orders, the derivatives of their steps, what they take implicitly."""
+"""Methods of integration, also a user's own: tableaus, orders, the derivatives of their steps, what they take implicitly."""
 
 import dataclasses
 
-import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import DOP853
-from trees import random_state, random_states, small_tree, tree_of_kinds
+from trees import random_state, tree_of_kinds
 
 import tmt
-from tmt.compiled import runner_of
+from tmt.compiled import forms
 from tmt.derivation import method
 from tmt.exact.motion import trajectory
-from tmt.methods import METHODS, amplification, derivatives, dop853, one_step
+from tmt.methods import (
+    METHODS,
+    RungeKutta,
+    derivatives,
+    dop853,
+    method_named,
+    one_step,
+)
+from tmt.methods.stepping import Method, advance
 
 BENT = np.radians([30.0, 20.0, 60.0])
 REST = np.zeros(3)
 EPS = np.finfo(float).eps
-FIXED = [name for name, stepping in METHODS.items() if not stepping.adaptive]
-ORDERS = {name: METHODS[name].order for name in FIXED}
-ORDERS["rk4_mean_speed"] = 4  # of hinges; with balls see below
-SMALL = small_tree()
 
 
 def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert len(dop853.A) == DOP853.n_stages
     assert all(np.array_equal(row, DOP853.A[i, :i]) for i, row in enumerate(dop853.A))
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
-    assert np.array_equal([*dop853.ERROR_5, 0.0], DOP853.E5)  # with one of the slope at the end of the step
-    assert np.array_equal([*dop853.ERROR_3, 0.0], DOP853.E3)
-
-
-@pytest.mark.parametrize("name", FIXED)
-def test_order(name):
-    """One step against two halves: what they differ by falls with dt to the power of order + 1."""
-    implicit = METHODS[name].solves_stages  # those take long in many digits: doubles, at larger steps
-    number, large = (float, 0.04) if implicit else (mpmath.mpf, mpmath.mpf("0.01"))
-    rest, start = [number(0)] * 3, [number(float(a)) for a in BENT]
-
-    def after(steps, duration):
-        state = start, rest
-        for _ in range(steps):
-            state = one_step(METHODS[name], tmt.ARM, *state, rest, duration / steps)
-        return np.concatenate(state)
-
-    with mpmath.workdps(50):
-        coarse, fine = (max(abs(after(1, dt) - after(2, dt))) for dt in (large, large / 2))
-        order = float(mpmath.log(coarse / fine, 2)) - 1
-        assert order == pytest.approx(ORDERS[name], abs=0.3 if implicit else 0.15)
+    assert np.array_equal([*dop853.ERRORS[0], 0.0], DOP853.E5)  # with one of the slope at the end of the step
+    assert np.array_equal([*dop853.ERRORS[1], 0.0], DOP853.E3)
 
 
 def test_methods_keep_their_order_with_balls():
@@ -64,53 +48,6 @@ def test_methods_keep_their_order_with_balls():
 
     for name, order in (("rk4", 4), ("rk4_mean_speed", 2), ("implicit_midpoint", 2), ("dopri8", 8)):
         assert abs(np.log2(error(name, 8) / error(name, 16)) - order) < 0.4
-
-
-def test_an_adaptive_method_keeps_to_its_tolerance():
-    _, *exact = tmt.simulate(BENT, REST, REST, 1 / 4096, 4096, "dopri8")
-    errors = []
-    for tolerance in (1e-4, 1e-8, 1e-12):
-        _, *path = tmt.simulate(BENT, REST, REST, 0.25, 4, "dopri8_adaptive", tolerance=tolerance)
-        errors.append(max(np.abs(a[-1] - b[-1]).max() for a, b in zip(path, exact)))
-        assert 0.0 < errors[-1] < 100 * tolerance
-    assert errors[0] > 1e6 * errors[-1]
-
-
-def test_every_evaluation_of_an_implicit_method_is_counted():
-    counted, stepping, state = 0, METHODS["implicit_midpoint"], (BENT.tolist(), [1.0, 2.0, 3.0])
-
-    def slope(q, qd):
-        nonlocal counted
-        counted += all(isinstance(x, float) for x in (*q, *qd))  # else it is for the Jacobian of one
-        return stepping.slope(tmt.ARM, q, qd, [0.0] * 3, 0.1)
-
-    for _ in range(4):
-        state = stepping.step(slope, *state, 0.1)
-    path = np.full((2, 1, 5, 3), np.nan)
-    path[:, 0, 0] = BENT, [1.0, 2.0, 3.0]
-    _, evaluations = runner_of(tmt.ARM, "implicit_midpoint").follow(*path, np.zeros((1, 3)), 0.1, 0.0, 1)
-    assert np.allclose(path[:, 0, -1], state, rtol=0, atol=1e-12)
-    # over any scalar the stages are found once more; compiled code counts the linear equations that it starts from
-    assert evaluations == counted
-
-
-@pytest.mark.parametrize("name", [name for name in METHODS if name != "gauss_legendre_4"])  # which takes long
-def test_the_jacobian_of_a_step_is_that_of_small_movements(name, monkeypatch):
-    """By the derivatives of its linear system, in parts, and by dual numbers through the solution."""
-    (q, later), (qd, faster), (tau, _) = random_states(np.random.default_rng(3), SMALL, 2)
-    stepping, dt, nv, move, h = METHODS[name], 0.05, len(SMALL.axis), SMALL.coordinates.move, 1e-6
-    J = amplification(stepping, SMALL, q, qd, tau, dt)
-    u = h * np.concatenate([np.eye(2 * nv), -np.eye(2 * nv)]).T  # a column each, all at once
-    state = [np.full(4 * nv, x) for x in q], [x + y for x, y in zip(qd, u[nv:])]
-    ends = one_step(stepping, SMALL, move(state[0], list(u[:nv])), state[1], tau.tolist(), dt)
-    (q1, q0), (qd1, qd0) = (np.split(np.array(part), 2, axis=1) for part in ends)
-    change = np.concatenate([SMALL.coordinates.difference(q1, q0), qd1 - qd0]) / (2 * h)
-    assert np.abs(change - J).max() < 1e-6 * np.abs(J).max()
-    monkeypatch.setattr(derivatives, "PART", nv)
-    both = amplification(stepping, SMALL, [later, q], [faster, qd], tau, np.array([0.02, dt]))
-    assert both[1] == pytest.approx(J, rel=1e-11, abs=1e-12)
-    monkeypatch.setattr(derivatives, "FEW_SPEEDS", nv)
-    assert amplification(stepping, SMALL, q, qd, tau, dt) == pytest.approx(J, rel=1e-10, abs=1e-10)
 
 
 FORK = dataclasses.replace(  # a hinge that carries two more on branches of their own
@@ -142,21 +79,69 @@ def test_which_gains_are_implicit(name, speed, position):
         assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
 
 
-def test_a_controller_adds_to_the_torque(rng):
-    """Of hinges and slides beside a ball too; of no gains a Tree says nothing."""
-    place, speed, torque = random_state(rng, SMALL)
-    values = [place[i] for i in SMALL.coordinates.first_positions]
-    wanted = torque - np.array(SMALL.position_gain) @ values - np.array(SMALL.speed_gain) @ speed
-    plain = dataclasses.replace(SMALL, position_gain=(), speed_gain=())
-    expected = tmt.acceleration(place, speed, wanted, plain)
-    assert np.allclose(tmt.acceleration(place, speed, torque, SMALL), expected, rtol=1e-10, atol=1e-10)
-    zeros = dataclasses.replace(tmt.ARM, position_gain=np.zeros((3, 3)), speed_gain=np.zeros((3, 3)))
-    assert zeros == tmt.ARM and not zeros.has_gains and DRIVEN != FORK
-
-
 def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
     left = DRIVEN.lock({"alpha": 0.3})
     assert np.array_equal(left.position_gain, P[1:, 1:]) and np.array_equal(left.speed_gain, S[1:, 1:])
     assert DRIVEN.lock({"beta": 0.0}).position_gain == ((40.0, 0.0), (0.0, 20.0))
     with pytest.raises(ValueError, match=r"'beta' cannot be locked at 0\.3"):
         DRIVEN.lock({"beta": 0.3})
+
+
+class Midpoint(Method):
+    """The explicit midpoint rule, made from Method."""
+
+    order = 2
+
+    def step(self, slope, q, qd, dt):
+        half = advance(q, dt / 2, (1.0,), [qd]), advance(qd, dt / 2, (1.0,), [slope(q, qd)])
+        return advance(q, dt, (1.0,), [half[1]]), advance(qd, dt, (1.0,), [slope(*half)])
+
+
+def test_a_method_of_ones_own(rng, monkeypatch):
+    monkeypatch.setitem(METHODS, "mine", Midpoint())
+    monkeypatch.setitem(METHODS, "tableau", RungeKutta(2, ((), (0.5,)), (0.0, 1.0), (0.0, 0.5)))
+    mine = method_named("mine")
+    assert mine.stages == 2 and not (mine.adaptive or mine.solves_stages)
+    q, qd, tau = rng.uniform(-1, 1, (3, 9, 3))
+    found, same = (tmt.simulate(q, qd, tau, 0.01, 20, name) for name in ("mine", "tableau"))
+    assert found.evaluations == same.evaluations == 9 * 20 * 2
+    assert all(np.allclose(a, b, rtol=0, atol=1e-12) for a, b in zip(found, same))
+    with pytest.raises(ValueError, match="tolerance"):
+        tmt.simulate(BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)
+    monkeypatch.setitem(METHODS, "mine", METHODS["explicit_euler"])  # is used at once
+    assert not np.allclose(tmt.simulate(q, qd, tau, 0.01, 20, "mine").q, same.q, rtol=0, atol=1e-6)
+
+
+class Longer(RungeKutta):
+    """A step that is another than the tableau says."""
+
+    def step(self, slope, q, qd, dt, *joints):
+        return super().step(slope, q, qd, 2.0 * dt, *joints)
+
+
+class Weaker(RungeKutta):
+    """Half the accelerations."""
+
+    def slope(self, tree, q, qd, tau, dt, *dynamics):
+        return [0.5 * a for a in super().slope(tree, q, qd, tau, dt, *dynamics)]
+
+
+@pytest.mark.parametrize("own, form", [(Longer, 0), (Weaker, 0), (Weaker, 1)])  # composite; articulated
+def test_another_step_or_slope_is_taken_and_not_kept(own, form, folder, monkeypatch):
+    monkeypatch.setattr(forms, "FORMS", forms.FORMS[form : form + 1])
+    rk4 = METHODS["rk4"]
+    stepping = own(rk4.order, rk4.A, rk4.b, rk4.c)
+    monkeypatch.setitem(METHODS, "mine", stepping)
+    motion = tmt.simulate(BENT, [1.0] * 3, REST, 0.01, 2, "mine")
+    state = BENT.tolist(), [1.0] * 3
+    for k in (1, 2):
+        state = one_step(stepping, tmt.ARM, *state, [0.0] * 3, 0.01)
+        assert np.allclose(state, [motion.q[k], motion.qd[k]], rtol=0, atol=1e-12)
+    assert not list(folder.glob("*"))  # it may be another tomorrow, with the same name
+
+
+@pytest.mark.parametrize("own", [Midpoint, "rk4", None])
+def test_what_is_no_method_is_refused(own, monkeypatch):
+    monkeypatch.setitem(METHODS, "mine", own)
+    with pytest.raises(ValueError, match=r"^METHODS\['mine'\] is .* is expected$"):
+        tmt.simulate(BENT, REST, REST, 0.1, 1, "mine")

@@ -91,23 +91,6 @@ def test_a_double_pendulum_has_the_form_of_textbooks():
     assert symbols.parameters[l1] == (0.5, "m", "from joint0 to joint1, along -z")
 
 
-def test_a_cart_pole_has_no_term_that_vanishes():
-    symbols = symbolic(cart_pole())
-    cart, pole, c, rotor, q = sympy.symbols("m_cart m_pole c_pole J_hinge q_hinge")
-    expected = [[cart + pole, pole * c * sympy.cos(q)], [pole * c * sympy.cos(q), pole * c**2 + rotor]]
-    assert symbols.entries["mass_matrix"] == sympy.Matrix(expected)
-
-
-def test_rounding_of_a_compiled_model_makes_no_terms(rng):
-    """Axes and offsets that are a few eps off."""
-    tree, clean = planar(3), symbolic(planar(3))
-    offset, axis = np.array(tree.offset) * (1 + 2 * EPS) + 1e-17, np.array(tree.axis) + [1e-16, 0, -3e-16]
-    noisy = replace(tree, offset=offset, axis=axis, com=np.array(tree.com) + 1e-17)
-    symbols = symbolic(noisy)
-    assert symbols.entries == clean.entries and symbols.parameters == clean.parameters
-    assert_right(symbols, noisy, rng)
-
-
 def test_a_large_robot_has_numbers_and_says_so(rng, monkeypatch):
     monkeypatch.setattr(trigonometry, "LARGEST_PRODUCT", 100)
     tree = tree_of("arm6").lock({"roll": 0.0, "pitch": 0.3, "flange": 0.0})
@@ -168,15 +151,6 @@ def test_documents_have_every_entry_and_the_bias_that_of_gravity_by_its_symbol(t
                 )
         count += 1 if section.fits else len(section.labelled)
     assert len(formulas_of(page(symbols, ["from a < b & c"]))) == count
-
-
-def test_symbols_and_numbers_as_they_are_read():
-    pendulum, cart = symbolic(planar(2)), symbolic(cart_pole(0.4), named=False)
-    assert r"\entry{M_{22} = I_{2,yy} + c_{2}^{2} m_{2}}" in latex(pendulum)
-    assert r"2 \dot{q}_{1} \dot{q}_{2} + \dot{q}_{2}^{2}) \sin {q_{2}}" in latex(pendulum)
-    assert r"\begin{pmatrix} 1.1 & 0.05 \cos" in latex(cart)
-    formulas = [formula.replace("\u2062", "") for formula in formulas_of(page(pendulum))]
-    assert formulas[2] == "M22=I2,yy+c22m2" and "q˙1q˙2" in formulas[3]
 
 
 def test_symbols_of_names_that_are_alike_are_different(tmp_path):

@@ -1,4 +1,6 @@
-"""The runs that errors are measured against: their digits, the errors that they measure, and what is too stiff for a series."""
+"""Runs that errors are measured against: their digits, what is too stiff for a series; which joints a motion needs."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from compare.experiments.speed.runs import floor
 from compare.experiments.speed.settings import scenes_of
 from compare.robots.arm import ARM
 from compare.truth import reference
+from compare.truth.smallest import needed
 from tmt.exact import motion as reference_run
 
 BENT = next(case for case in scenes_of(ARM) if case.name == "bent, free")
@@ -46,6 +49,28 @@ def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_aga
     assert swing.high.shape == swing.low.shape == (65, 2)
 
 
+def test_a_motion_is_computed_once_and_kept_with_all_that_it_follows_from(monkeypatch, tmp_path):
+    monkeypatch.setenv("TMT_CACHE", str(tmp_path))
+    computed = []
+    monkeypatch.setattr(reference, "truth", lambda *of: computed.append(of) or reference_run.truth(*of))
+    heavier = replace(SHORT.tree, mass=tuple(mass * (1.0 + 1e-15) for mass in SHORT.tree.mass))
+    start = tuple(map(tuple, (*SHORT.start, SHORT.tau)))
+
+    def path(tree, dt=0.005):
+        reference.in_pairs.cache_clear()  # as in another process
+        return reference.in_pairs(tree, *start, dt, 64, 1)
+
+    first, apart = path(SHORT.tree)
+    again, apart_again = path(SHORT.tree)
+    assert len(computed) == 1 and apart == apart_again and first.steps == again.steps
+    assert np.array_equal(first.high, again.high) and np.array_equal(first.low, again.low)
+    others = path(heavier), path(SHORT.tree, 0.0050001)
+    assert len(computed) == 3 and not any(np.array_equal(first.low, other.low) for other, _ in others)
+    for file in tmp_path.iterdir():  # damaged
+        file.write_bytes(file.read_bytes()[:-1])
+    assert np.array_equal(path(SHORT.tree)[0].low, first.low) and len(computed) == 4
+
+
 def test_a_run_ends_where_it_would_take_too_many_steps(monkeypatch):
     case = spring(4).cases[-1]
     work = reference_run.BESIDE + len(reference_run.equations(case.tree, case.tau, "composite").code)
@@ -58,9 +83,22 @@ def test_a_run_ends_where_it_would_take_too_many_steps(monkeypatch):
         run()
 
 
-def test_whether_a_model_is_too_stiff_is_seen_after_a_few_steps():
-    start = [1.0], [0.0], [0.0]
-    path = reference_run.trajectory(spring(1e8).tree, *start, 0.125, 1)
-    assert path.high[-1, 0] == pytest.approx(np.cos(0.125 * 1e4), abs=1e-9)
-    with pytest.raises(reference_run.TooManySteps, match="series"):
-        reference_run.trajectory(spring(1e14).tree, *start, 0.125, 1)
+KNOWN = {"zero, free": ("beta",), "ball catch, held": ARM.joints, "bent, held": ARM.joints}
+SCENES = {  # what is not needed, and the scene
+    "in its plane": (("beta",), {"posture": (20, 0, 40), "speed": (30, 0, -50)}),
+    "out of it by 1e-6 deg": ((), {"posture": (20, 1e-6, 40)}),
+    "sin of the double nearest to pi is not 0": ((), {"posture": (20, 180, 40)}),
+    "plane of a locked alpha": (("beta",), {"posture": (30, 0, 0), "locked": ("alpha",)}),
+    "at rest without gravity": (ARM.joints, {"posture": "bent", "gravity": False}),
+    "the rounded torque does not hold": (("beta",), {"posture": "zero", "torque": (-2.20725, 0, -2.20725)}),
+}
+
+
+def test_what_is_not_needed():
+    for case in ARM.cases:
+        assert needed(case).stays == KNOWN.get(case.name, ()), case.name
+
+
+@pytest.mark.parametrize("stays, scene", SCENES.values(), ids=SCENES)
+def test_what_is_not_needed_in_a_scene(stays, scene):
+    assert needed(ARM.case("a scene", **scene)).stays == stays

@@ -1,4 +1,4 @@
-"""The cores of this machine, and work that is spread over them: compiled code, which lets others run beside it."""
+"""The cores of this machine, and compiled work that is spread over them."""
 
 import os
 from collections.abc import Callable
@@ -10,14 +10,13 @@ Result = TypeVar("Result")
 
 
 def cores() -> int:
-    """How many cores of the machine this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def in_threads(
     work: Callable[[slice], Result], count: int, parts: int, block: int, threads: int
 ) -> list[Result]:
-    """work(slice) of parts of a number of states, which are cut at multiples of a block; in this number of threads."""
+    """work(slice) of parts of a number of states, cut at multiples of a block, in so many threads."""
     ends = [count * k // parts // block * block for k in range(parts)] + [count]
     slices = [slice(*pair) for pair in pairwise(ends)]
     if min(threads, parts) == 1:

@@ -1,8 +1,9 @@
 """The functions by which a compiled quantity is called: of one state, and of many.
 
-one(q, qd, tau, dt, out): a state; whether it is wrong: a number that the quantity takes or gives is not finite, a quaternion
-not of length 1. Where a quantity takes qdd, that is in the place of tau. rows(q, qd, tau, dt, out, count, of_q, of_qd, of_tau,
-of_dt): states one after the other, of_q numbers from each q to the next (0: the same for all); how often some were wrong.
+one(q, qd, tau, dt, out): a state; whether it is wrong: a number that the quantity takes or gives is not
+finite, a quaternion not of length 1. Where a quantity takes qdd, that is in the place of tau. rows(q, qd,
+tau, dt, out, count, of_q, of_qd, of_tau, of_dt): states one after the other, of_q numbers from each q to the
+next (0: the same for all); how often some were wrong.
 """
 
 from itertools import accumulate
@@ -37,7 +38,6 @@ class Entries:
         self.balls = [joint.q.start for joint in tree.coordinates.balls]
 
     def wrong(self, code: Code, state: Value, out: Value) -> Value:
-        """Which of the states, or of their results, are not right."""
         size = Variable(code, self.kind, 0.0)
         for array, count in ((state, self.taken), (out, self.results)):
             for k in code.each(count):

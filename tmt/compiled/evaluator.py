@@ -26,10 +26,10 @@ TOGETHER = 32  # states that are not parted
 
 
 class Evaluator:
-    """One quantity of a tree, flat, `size` numbers for each state: it takes q (nq), qd and tau or qdd (nv), dt (1).
+    """One quantity of a tree, `size` numbers for each state: it takes q (nq), qd and tau or qdd (nv), dt (1).
 
-    Arrays are contiguous and float64: their shapes are not checked. Numbers are computed as they are: of angles beyond 2^49 rad
-    results are NaN.
+    Arrays are contiguous and float64: their shapes are not checked. Numbers are computed as they are: of
+    angles beyond 2^49 rad results are NaN.
     """
 
     def __init__(self, tree: Tree, quantity: str):
@@ -67,7 +67,7 @@ class Evaluator:
         return self.loops[wide]
 
     def of_one(self, *arrays: np.ndarray) -> Any:
-        """The quantity of one state, arrays of doubles of the right shapes; None where it is none or a number is not finite."""
+        """The quantity of one state in arrays of doubles; None where it is none or a number is not finite."""
         try:
             out, address = self.local.place
         except AttributeError:  # of this thread
@@ -79,7 +79,7 @@ class Evaluator:
         return tuple(out.copy()) if self.has_parts else out.copy()
 
     def of_any(self, *arrays: np.ndarray) -> Any:
-        """The quantity of states of any batch shape, arrays of doubles, as tmt's function returns it; None as above."""
+        """The quantity of states of any batch shape, as tmt's function returns it; None as above."""
         batch = np.broadcast_shapes(*(array.shape[:-1] for array in arrays))
         q, *rates = (rows_of(x, batch if k == 0 or x.ndim > 1 else ()) for k, x in enumerate(arrays))
         rows = self.of_rows(q, *rates)
@@ -89,7 +89,7 @@ class Evaluator:
         return tuple(np.moveaxis(result, len(batch), 0).copy()) if self.has_parts else result
 
     def of_rows(self, q: np.ndarray, *rates: np.ndarray) -> np.ndarray | None:
-        """The quantity of rows of states, (N, size), some in each thread; of rates one row may stand for all. None as above."""
+        """The quantity of rows of states, (N, size); of rates one row may stand for all. None as above."""
         count, n = len(q), len(self.tree.axis)
         arrays = [q, *rates]
         out = np.empty((count, self.size))
@@ -103,7 +103,7 @@ class Evaluator:
         return out if all(in_threads(fill, count, threads, TOGETHER, threads)) else None
 
     def fill(self, wide: bool, out: np.ndarray, *arrays: np.ndarray) -> bool:
-        """Fill rows out (N, size) of q (N, nq), qd, tau (N, nv), or one row for all, in one thread; False: some are wrong."""
+        """Fill rows out (N, size) in one thread, of N rows or of one for all; False: some are wrong."""
         arrays = (*arrays, *[np.zeros((1, size)) for size in self.sizes[len(arrays) :]])
         steps = [0 if len(array) == 1 else array.shape[1] for array in arrays]
         return self.loop(wide)(*(x.ctypes.data for x in (*arrays, out)), len(out), *steps) == 0
@@ -117,6 +117,5 @@ class Evaluator:
 
 
 def rows_of(array: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
-    """States of a batch one after the other, as compiled code takes them."""
     states = array if array.shape[:-1] == batch else np.broadcast_to(array, (*batch, array.shape[-1]))
     return np.require(states.reshape(-1, array.shape[-1]), requirements=["C", "A", "W"])

@@ -1,8 +1,8 @@
-"""Which form of the dynamics is traced for a tree: of the same sums in another order, that with the fewest operations.
+"""Which form of the dynamics is traced for a tree: of the same sums that with the fewest operations.
 
-It is counted for each quantity. Up to some ten joints in a row, and for trees of short branches, those are the sums in the frames
-of the joints (composite.py); the bias is nearly always shorter there. Mbar of long paths, and the accelerations of large trees,
-are shorter in the axes of the world (articulated.py).
+It is counted for each quantity. Up to some ten joints in a row, and for trees of short branches, those are
+the sums in the frames of the joints (composite.py); the bias is nearly always shorter there. Mbar of long
+paths, and the accelerations of large trees, are shorter in the axes of the world (articulated.py).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -14,9 +14,9 @@ from tmt.derivation.dual import seeded
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms, reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
-from tmt.derivation.vectors import Rows, Scalar, Values
+from tmt.derivation.vectors import Rows, Scalar, Values, minus, plus
 from tmt.methods import Linearized, method_named, one_step
-from tmt.methods.stepping import Dynamics, Held, Method, minus, plus
+from tmt.methods.stepping import Dynamics, Held, Method
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
@@ -24,9 +24,7 @@ from .trace import Expression
 
 Way = TypeVar("Way")
 MANY = 20  # speeds from which derivatives are not traced by dual numbers
-DENSE = 10  # speeds up to which linear systems are solved in straight lines, and the bias is differentiated by dual numbers
-
-
+DENSE = 10  # speeds up to which systems are solved in straight lines, dh/dqd is by dual numbers
 FORMS = (
     Form(composite.mass_matrix_and_bias, composite.generalized_force),
     Form(articulated.mass_matrix_and_bias, articulated.generalized_force, linearized.rates),
@@ -35,16 +33,14 @@ LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of deriv
 
 
 def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], ways: Iterable[Way]) -> Traced:
-    """Of way(w, *arrays), arrays of these sizes, for each w of the ways, what has the fewest operations."""
     return min((trace(name, sizes, partial(way, w)) for w in ways), key=lambda traced: traced.length)
 
 
 class Traceable(Dynamics):
     """Mbar and h of a form, for traced functions.
 
-    Of more than a few speeds the derivatives of h are in closed form, and linear systems are solved by a function that is called.
-    by_bodies: accelerations are those of articulated bodies, where all that a method takes implicitly acts at single joints: then
-    it counts as armature.
+    Of more than a few speeds the derivatives of h are in closed form, and linear systems solved by a call.
+    by_bodies: by articulated bodies, where all that a method takes implicitly acts at single joints.
     """
 
     def __init__(self, tree: AnyTree, terms: Terms, by_bodies: bool = False):
@@ -80,7 +76,7 @@ def all_dynamics(tree: AnyTree) -> list[Traceable]:
 
 @lru_cache(maxsize=64)
 def dynamics_for(tree: Tree) -> list[Traceable]:
-    """The ways that are traced for slopes; of a large tree that to its accelerations which is the shortest."""
+    """The ways that are traced for slopes; of a large tree the shortest to its accelerations."""
     nq, n, every = tree.coordinates.nq, len(tree.axis), all_dynamics(tree)
     if n <= DENSE:
         return every
@@ -135,12 +131,10 @@ def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
 
 
 def flat(nested: Scalar) -> Values:
-    """The scalars of nested lists or tuples, in a row."""
     return [x for part in nested for x in flat(part)] if isinstance(nested, (list, tuple)) else [nested]
 
 
 def slope(tree: Tree, stepping: Method) -> Traced:
-    """The slope of a method as a function of (q, qd, tau, dt)."""
 
     def function(dynamics: Dynamics, q: Values, qd: Values, tau: Values, dt: Values) -> Values:
         return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
@@ -150,7 +144,6 @@ def slope(tree: Tree, stepping: Method) -> Traced:
 
 
 def directional(tree: Tree, stepping: Method) -> Traced:
-    """The slope and its derivative: (q, qd, tau, dt, dq, dqd) -> (qdd, dqdd); dq (nq) is a change of the numbers in q."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def both(

@@ -1,13 +1,14 @@
-"""Functions in LLVM's language: their text is written by operators on values and by loops and branches that are contexts.
+"""Functions in LLVM's language, written by operators on values and by contexts for loops and branches.
 
-A value has a kind, as LLVM writes it: "double", "i64", "i1", "ptr", or "<8 x double>" and so on for several side by side. Plain
-numbers become constants of the other operand's kind. Nothing is regrouped and no product is fused into a sum unless `fma` says
-so: every processor does the same arithmetic, and several side by side do what one does. (llvmlite's IRBuilder writes the same
-text in three times the time: a third more until a quantity of 30 speeds is compiled.)
+A value has a kind, as LLVM writes it: "double", "i64", "i1", "ptr", or "<8 x double>" and so on for several
+side by side. Plain numbers become constants of the other operand's kind. Nothing is regrouped and no product
+is fused into a sum unless `fma` says so: every processor does the same arithmetic, and several side by side
+do what one does. (llvmlite's IRBuilder writes the same text in three times the time: a third more until a
+quantity of 30 speeds is compiled.)
 """
 
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
 FEW = 24  # repetitions that are written out
@@ -37,6 +38,12 @@ def constant(kind: str, number: Number) -> str:
     return text if width == 1 else "<" + ", ".join([f"{element(kind)} {text}"] * width) + ">"
 
 
+def operator_of(operation: str, is_reflected: bool = False) -> "Callable[[Value, Value | Number], Value]":
+    if is_reflected:
+        return lambda self, other: self.two(operation, other, self)
+    return lambda self, other: self.two(operation, self, other)
+
+
 class Value:
     __array_ufunc__ = None
     __slots__ = ("code", "kind", "name")
@@ -45,7 +52,6 @@ class Value:
         self.code, self.kind, self.name = code, kind, name
 
     def like(self, x: "Value | Number", kind: str = "") -> "Value":
-        """Another value, or a number as a constant of this kind (or another)."""
         return x if isinstance(x, Value) else self.code.number(x, kind or self.kind)
 
     def two(self, operation: str, a: "Value | Number", b: "Value | Number") -> "Value":
@@ -53,32 +59,15 @@ class Value:
             operation = "fdiv" if operation == "sdiv" else f"f{operation}"
         return self.code.put(self.kind, f"{operation} {self.kind} {self.like(a).name}, {self.like(b).name}")
 
-    def __add__(self, other: "Value | Number") -> "Value":
-        return self.two("add", self, other)
-
-    def __radd__(self, other: Number) -> "Value":
-        return self.two("add", other, self)
-
-    def __sub__(self, other: "Value | Number") -> "Value":
-        return self.two("sub", self, other)
-
-    def __rsub__(self, other: Number) -> "Value":
-        return self.two("sub", other, self)
-
-    def __mul__(self, other: "Value | Number") -> "Value":
-        return self.two("mul", self, other)
-
-    def __rmul__(self, other: Number) -> "Value":
-        return self.two("mul", other, self)
-
-    def __truediv__(self, other: "Value | Number") -> "Value":
-        return self.two("sdiv", self, other)
+    __add__, __radd__ = operator_of("add"), operator_of("add", is_reflected=True)
+    __sub__, __rsub__ = operator_of("sub"), operator_of("sub", is_reflected=True)
+    __mul__, __rmul__ = operator_of("mul"), operator_of("mul", is_reflected=True)
+    __truediv__ = operator_of("sdiv")
 
     def __neg__(self) -> "Value":
         return self.code.put(self.kind, f"fneg {self.kind} {self.name}")
 
     def fma(self, b: "Value | Number", c: "Value | Number") -> "Value":
-        """self b + c, rounded once."""
         return self.code.intrinsic("fma", self, self.like(b), self.like(c))
 
     def function(self, name: str) -> "Value":
@@ -86,7 +75,6 @@ class Value:
         return self.code.intrinsic(name, self)
 
     def bits(self, operation: str, other: "Value | Number") -> "Value":
-        """and, or, xor, shl of whole numbers or flags."""
         return self.code.put(self.kind, f"{operation} {self.kind} {self.name}, {self.like(other).name}")
 
     def negated(self) -> "Value":
@@ -111,7 +99,6 @@ class Value:
         return self.code.put(kind, f"{how} {self.kind} {self.name} to {kind}")
 
     def lane(self, l: int) -> "Value":
-        """One of several side by side; of a single one itself."""
         if width_of(self.kind) == 1:
             return self
         return self.code.put(element(self.kind), f"extractelement {self.kind} {self.name}, i32 {l}")
@@ -125,13 +112,11 @@ class Value:
         return self.code.put(kind, f"shufflevector {self.kind} {self.name}, {self.kind} undef, {mask}")
 
     def everywhere(self, width: int) -> "Value":
-        """The value in each of `width` lanes."""
         if width == 1:
             return self
         return Value(self.code, wide(self.kind, width), "undef").with_lane(0, self).shuffled([0] * width)
 
     def at(self, index: "Value | int", kind: str = DOUBLE) -> "Value":
-        """Of a pointer: the place of a number of an array."""
         place = self.like(index, INDEX)
         return self.code.put(POINTER, f"getelementptr {kind}, ptr {self.name}, i64 {place.name}")
 
@@ -148,8 +133,6 @@ class Value:
 
 
 class Variable:
-    """A value that changes, of one function; `first` from where it is made on."""
-
     def __init__(self, code: "Code", kind: str, first: Value | Number):
         self.kind, self.place = kind, code.reserve(kind)
         self.set(first)
@@ -190,7 +173,6 @@ class Code:
         return self.call(name, *values, kind=kind)
 
     def library(self, name: str, x: Value) -> Value:
-        """A function of C's library, of each lane."""
         self.intrinsics.add(f"declare double @{name}(double) nounwind memory(none)")
         result = x
         for l in range(width_of(x.kind)):
@@ -199,7 +181,6 @@ class Code:
         return result
 
     def call(self, name: str, *values: Value, kind: str = "void") -> Value:
-        """The result of a function; of one without a result nothing can be done with it."""
         text = f"call {kind} @{name}({', '.join(f'{v.kind} {v.name}' for v in values)})"
         if kind != "void":
             return self.put(kind, text)
@@ -207,7 +188,6 @@ class Code:
         return Value(self, kind, "")
 
     def reserve(self, kind: str, count: int = 1) -> Value:
-        """A place of the function's own for `count` values."""
         self.count += 1
         name = f"%v{self.count}"
         self.reserved.append(f"  {name} = alloca {kind}, i64 {count}, align 64")
@@ -218,7 +198,6 @@ class Code:
         return f"b{self.count}"
 
     def begin(self, label: str) -> None:
-        """A block begins; the one before it goes on to it, unless it went elsewhere."""
         self.lines += [f"  br label %{label}", f"{label}:"]
 
     @contextmanager
@@ -241,7 +220,6 @@ class Code:
             yield loop.index
 
     def branch(self, flag: Value, yes: str, no: str) -> None:
-        """Go on in one of two blocks, of which the first begins here."""
         self.lines += [f"  br i1 {flag.name}, label %{yes}, label %{no}", f"{yes}:"]
 
     @contextmanager
@@ -266,8 +244,6 @@ class Code:
 
 
 class Loop:
-    """A loop that is being written: its index, and the ways out of it."""
-
     def __init__(self, code: Code, index: Value, done: str):
         self.code, self.index, self.done = code, index, done
 

@@ -1,4 +1,4 @@
-"""Loops that traced functions call: solutions of linear systems, and derivatives in all directions, several side by side."""
+"""Loops that traced functions call: linear systems, and derivatives in several directions side by side."""
 
 from .ir import DOUBLE, INDEX, POINTER, Code, Value, wide
 from .machine import lanes
@@ -7,7 +7,7 @@ WIDTH = lanes()  # directions, states or runs that are taken side by side
 
 
 def solve() -> Code:
-    """solve(matrix, stride, right, n): the solution of matrix x = right in place of right, by L U without pivots.
+    """solve(matrix, stride, right, n): x with matrix x = right in place of right, by L U without pivots.
 
     matrix: n rows of `stride` numbers, of which the first n belong to it; it is written over.
     """
@@ -38,7 +38,6 @@ def solve() -> Code:
 
 
 def solution(n: int) -> Code:
-    """solution(in, out): of n rows of n numbers and the right-hand side."""
     code = Code("solution", {"in": POINTER, "out": POINTER}, attributes="noinline")
     matrix = code.reserve(DOUBLE, n * n)
     with code.loop(n * n) as loop:

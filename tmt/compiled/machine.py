@@ -1,4 +1,4 @@
-"""Machine code from LLVM's text, by llvmlite: for this processor, optimised, and as functions that ctypes can call."""
+"""Machine code from LLVM's text, by llvmlite: for this processor, optimised, as functions for ctypes."""
 
 import ctypes
 from collections.abc import Callable
@@ -27,7 +27,6 @@ def lanes() -> int:
 
 
 def versions() -> str:
-    """What machine code depends on beside its text."""
     return repr((llvmlite.__version__, llvm.llvm_version_info, llvm.get_default_triple(), *processor()))
 
 
@@ -42,7 +41,7 @@ def object_code(text: str) -> bytes:
     with lock:
         machine = target()
         module = llvm.parse_assembly(text)
-        # straight lines are as short as they can be: of much code LLVM's passes take long and leave it as fast as it was
+        # of many straight lines LLVM's passes take long and leave them as fast as they were
         level = 2 if len(text) < MUCH else 0
         passes = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=level))
         passes.getModulePassManager().run(module, passes)
@@ -55,8 +54,6 @@ def object_code(text: str) -> bytes:
 
 
 class Library:
-    """Compiled functions, from LLVM's text or from an object file that was made of it."""
-
     def __init__(self, text: str = "", code: bytes | None = None):
         code = object_code(text) if code is None else code
         with lock:
@@ -65,10 +62,10 @@ class Library:
             self.engine.finalize_object()
 
     def function(self, name: str, result: Any, *arguments: Any, keeps_lock: bool = False) -> Function:
-        """A function of that name as ctypes calls it, of ctypes' types; keeps_lock: Python's other threads wait meanwhile."""
+        """A function by its name, of ctypes' types; keeps_lock: Python's other threads wait meanwhile."""
         address = self.engine.get_function_address(name)
         if not address:
             raise KeyError(name)
         function = (ctypes.PYFUNCTYPE if keeps_lock else ctypes.CFUNCTYPE)(result, *arguments)(address)
-        setattr(function, "library", self)  # noqa: B010 - the code lives as long as it, of which ctypes' type knows nothing
+        setattr(function, "library", self)  # noqa: B010 - it must live as long; ctypes has no such field
         return function

@@ -27,8 +27,8 @@ runners: dict[tuple[int, str], "Runner"] = {}
 class Runner:
     """The runs of a tree by a method, of one state at a time or of several side by side with the same bits.
 
-    Paths q (runs, records, nq) and qd (runs, records, nv) begin with the first states; tau (runs, nv). All are contiguous,
-    float64 and memory of their own, which is not checked.
+    Paths q (runs, records, nq) and qd (runs, records, nv) begin with the first states; tau (runs, nv). That
+    all are contiguous and float64 is not checked.
     """
 
     def __init__(self, tree: Tree, stepping: Method):
@@ -45,7 +45,7 @@ class Runner:
         return self.functions[width]
 
     def call(self, width: int, arrays: Sequence[Array], dt: float, tolerance: float, every: int = 1) -> Call:
-        """A call of compiled code alone that fills q, qd, tau and info (runs, 3), see runs.py, which must live as long as it."""
+        """A call that fills arrays q, qd, tau, info, see runs.py: they must live as long as it."""
         q, qd, tau, info = map(address, arrays)
         sizes = every, arrays[0].shape[1], len(arrays[0])
         return partial(self.compiled(width), q, qd, tau, dt, tolerance, info, *sizes)
@@ -53,7 +53,7 @@ class Runner:
     def follow(self, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int) -> Ended:
         """Fill the paths, which hold each `every`-th state alone.
 
-        Returns why each run ended, 0 where it did not, and after how many steps, (runs, 2); and the evaluations of the dynamics.
+        Returns why each run ended (0: it did not) and after how many steps, (runs, 2); and the evaluations.
         Where a run ended, its path is NaN from there on.
         """
         from .machine import lanes
@@ -74,7 +74,6 @@ class Runner:
         return self.outcome(q, qd, info, every)
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:
-        """What `follow` returns, once compiled code has filled the paths and info."""
         steps, codes = (q.shape[1] - 1) * every, info[:, :2]
         taken = steps * len(q)
         if codes[:, 0].any():

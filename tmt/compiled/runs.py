@@ -1,8 +1,8 @@
 """Motions in compiled code: the loops over runs, records and steps around the traced step of a method.
 
-run(q, qd, tau, dt, tolerance, info, every, records, runs): paths q (runs, records, nq) and qd (runs, records, nv) are filled from
-their first states, of which each `every`-th is kept; tau (runs, nv). info (runs, 3) of whole numbers: why each run ended, 0 where
-it did not, after how many steps, and how often the dynamics were evaluated. What a path holds after its end says nothing.
+run(q, qd, tau, dt, tolerance, info, every, records, runs): paths q (runs, records, nq) and qd (runs, records,
+nv) are filled from their first states, of which each `every`-th is kept; tau (runs, nv). info (runs, 3) of
+whole numbers: why each run ended, 0 where it did not, after how many steps, and how many evaluations.
 """
 
 from collections.abc import Callable
@@ -10,9 +10,9 @@ from typing import Any
 
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
-from tmt.derivation.vectors import Values
+from tmt.derivation.vectors import Values, minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import DIVERGED, NEWTON, SMALL, Joints, minus, plus
+from tmt.methods.stepping import DIVERGED, NEWTON, SMALL, Joints
 from tmt.model.tree import Tree
 
 from . import forms, linear
@@ -28,18 +28,12 @@ SHORTEST_STEP, GROWTH, SHRINKING, SAFETY = 1e-9, 6.0, 0.333, 0.9
 
 def source(tree: Tree, stepping: Any, width: int) -> str:
     step = Step(tree, stepping, width)
-    if stepping.solves_stages:
-        advance = step.solving()
-    elif stepping.adaptive:
-        advance = step.adaptive()
-    else:
-        advance = step.explicit()
+    make = step.solving if stepping.solves_stages else step.adaptive if stepping.adaptive else step.explicit
+    advance = make()
     return module([*step.functions, run(step, advance)])
 
 
 class Step:
-    """The functions of one step, and the lines that call them."""
-
     # stepping: a Method, with what NEEDS says of its kind
     def __init__(self, tree: Tree, stepping: Any, width: int):
         self.tree, self.stepping, self.width = tree, stepping, width
@@ -49,7 +43,6 @@ class Step:
         self.wanted: Variable  # of an adaptive method: the step that its tolerance wants
 
     def add(self, traced: Traced, width: int, inline: bool = False) -> None:
-        """The functions of a traced one and of what it calls."""
         self.functions += functions(traced, width, inline)
         operations = [traced.tape.nodes[i] for i in traced.nodes]
         is_solved = any(kind == "call" and arguments[0] == "solution" for kind, arguments in operations)
@@ -57,7 +50,6 @@ class Step:
             self.functions += [linear.solve(), linear.solution(self.n)]
 
     def add_step(self, name: str) -> int:
-        """The slope, and the step or attempt that asks it; how many results that has."""
         nq, n, stepping = self.nq, self.n, self.stepping
         joints = [] if self.joints is FLAT else [self.joints]
         slope = forms.slope(self.tree, stepping)
@@ -85,7 +77,7 @@ class Step:
     def adaptive(self) -> Advance:
         nq, n, order = self.nq, self.n, self.stepping.order
         count = self.add_step("attempt")
-        # of each component of an error: the number of the state in whose units it is; None: an angle of a turn
+        # for each component of an error the number of the state in whose units it is; None: an angle
         scales: list[int | None] = []
         for joint in self.tree.coordinates.joints:
             scales += [None] * 3 if joint.kind == "ball" else [joint.q.start]
@@ -126,7 +118,6 @@ class Step:
         return advance
 
     def solving(self) -> Advance:
-        """A step whose stages solve an equation, by Newton's method with the exact Jacobian, several columns at a time."""
         nq, n, stepping, width = self.nq, self.n, self.stepping, linear.WIDTH
         unknown = n * stepping.stages
         columns = -(-unknown // width) * width
@@ -198,7 +189,7 @@ class Step:
 
 
 def squares(state: Value, result: Value, first: int, scales: list[int | None], tolerance: Value) -> Value:
-    """The sum of the squares of an estimate of the error, from number `first` on, in units of tolerance (1 + |value|)."""
+    """The sum of the squares of an error from number `first` on, in units of tolerance (1 + |value|)."""
     total = state.code.number(0.0)
     for k, scale in enumerate(scales):
         unit: Value | float = 2.0
@@ -211,7 +202,7 @@ def squares(state: Value, result: Value, first: int, scales: list[int | None], t
 
 
 def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
-    """What accelerations a of the stages leave of their equations (or linear ones), and its derivative by da."""
+    """What accelerations a of the stages leave of their equations, and its derivative by da."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
     def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:
@@ -277,14 +268,13 @@ def run(step: Step, advance: Advance) -> Code:
 
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:
-    """Why a state cannot be gone on from; 0: it can."""
     kind = wide(DOUBLE, width)
-    hinges = [joint.q.start for joint in tree.coordinates.joints if joint.kind == "hinge"]
     total, angles = Variable(code, kind, 0.0), code.number(0.0, kind)
     for k in code.each(tree.coordinates.nq + tree.coordinates.nv):
         total.set(total.get() + state.load(k * width, kind))
-    for k in hinges:
-        angles = angles + state.load(k * width, kind).function("fabs")
+    for joint in tree.coordinates.joints:
+        if joint.kind == "hinge":
+            angles = angles + state.load(joint.q.start * width, kind).function("fabs")
     sound = total.get().function("fabs").compare("lt", float("inf"))
     sound = sound.bits("and", angles.compare("lt", LIMIT))
     return sound.choose(code.number(0, wide(INDEX, width)), DIVERGED)

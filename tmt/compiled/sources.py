@@ -1,4 +1,4 @@
-"""Tmt's own files as they were when it was imported: what is compiled follows from these, not from what lies there later."""
+"""Tmt's own files as they were at its import, from which follows what is compiled."""
 
 import hashlib
 import os
@@ -26,7 +26,7 @@ def contents() -> str:
 
 
 def own_sources() -> str | None:
-    """A name for the contents of tmt's files; None if one has changed since the import, or a module is not from a file."""
+    """A name for the contents of tmt's files; None if one has changed, or a module is not from a file."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("tmt.")]
     if not all(type(module.__loader__) is SourceFileLoader for module in modules):
         return None

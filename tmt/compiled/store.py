@@ -1,9 +1,10 @@
 """Object files on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
-The name of a file is the hash of all that its machine code depends on: tmt's sources as imported, the versions of llvmlite and
-LLVM, the processor, the tree and what is compiled for it. What a file holds is run only if it is the user's own, nobody else can
-write to it, and it was written under this name: so it does not matter who may write to the folder. With any other file, without
-a folder or on a full disk, the code is compiled anew: it only costs time. To clear the folder is to delete it.
+The name of a file is the hash of all that its machine code depends on: tmt's sources as imported, the
+versions of llvmlite and LLVM, the processor, the tree and what is compiled for it. What a file holds is run
+only if it is the user's own, nobody else can write to it, and it was written under this name: so it does not
+matter who may write to the folder. With any other file, without a folder or on a full disk, the code is
+compiled anew: it only costs time. To clear the folder is to delete it.
 """
 
 import hashlib
@@ -27,9 +28,9 @@ READING = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_N
 
 
 def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Library:
-    """The compiled module of a source, from the folder if it lies there; what: all that the source follows from, with tmt itself.
+    """The compiled module of a source, from the folder if it lies there; what: all that it follows from.
 
-    Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept: it may be another.
+    Of what is the user's own (a class of trees, a method), or of changed sources, nothing is kept.
     """
     words = [own_sources(), versions(), *map(word_of, what)]
     parts = [word for word in words if word is not None]
@@ -58,7 +59,7 @@ def word_of(value: object) -> str | None:
 
 
 def read(path: Path) -> bytes | None:
-    """The object code of a file; None where others could have written it, it is damaged, or was written under another name."""
+    """The object code of a file; None where others may have written it, or it is not what was written."""
     with open(os.open(path, READING), "rb") as file:
         content = file.read() if is_own(os.fstat(file.fileno())) else b""
     written, code = content[:DIGEST], content[DIGEST:]
@@ -78,7 +79,6 @@ def digest(path: Path, code: bytes) -> bytes:
 
 
 def cache_folder() -> Path | None:
-    """None where there is no home."""
     if os.environ.get("TMT_CACHE"):
         return Path(os.environ["TMT_CACHE"])
     with suppress(RuntimeError):

@@ -1,4 +1,4 @@
-"""Straight-line code from a tape: one function, or a row of functions where the tape is long, for one state or several.
+"""Straight-line code from a tape: one function, or several of a long tape, for one state or several.
 
 A traced function has the signature void name(ptr in, ptr out): numbers in a row, of several states side by
 side each number of all of them together. A product that goes into one sum alone is rounded with it, once.
@@ -36,7 +36,6 @@ class Traced:
 
     @cached_property
     def places(self) -> dict[int, list[int]]:
-        """The places of a node among the results."""
         places: dict[int, list[int]] = defaultdict(list)
         for k, x in enumerate(self.outputs):
             places[self.tape.lift(x).i].append(k)
@@ -44,7 +43,6 @@ class Traced:
 
     @cached_property
     def items(self) -> dict[int, list[int]]:
-        """Of a node with several results, which of them are needed."""
         items: dict[int, list[int]] = defaultdict(list)
         for i in self.nodes:
             if self.tape.nodes[i][0] == "item":
@@ -53,7 +51,6 @@ class Traced:
 
     @property
     def length(self) -> float:
-        """How many operations it has, those of a linear system that it has solved among them."""
         calls = [self.tape.operands(i) for i in self.nodes if self.tape.nodes[i][0] == "call"]
         return self.operations + sum((1 + len(arguments)) ** 1.5 / 3 for arguments in calls)
 
@@ -77,7 +74,6 @@ def trace(name: str, sizes: Iterable[int], function: Callable[..., Sequence[Scal
 
 
 def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
-    """The code of a traced function, with all its parts, for `width` states side by side."""
     steps = Steps(traced)
     if len(steps.order) <= LONGEST:
         code = entry(traced.name, "alwaysinline" if inline else "noinline")
@@ -117,8 +113,6 @@ def places_handed_on(made: list[list[Key]], last: Mapping[Key, int]) -> tuple[di
 
 
 class Steps:
-    """The operations of a traced function in order, and which values each takes and makes."""
-
     def __init__(self, traced: Traced):
         tape, nodes = traced.tape, traced.nodes
         outputs = [tape.lift(x) for x in traced.outputs]
@@ -145,7 +139,7 @@ class Steps:
         return places_handed_on(made, last)
 
     def write(self, code: Code, order: list[int], width: int, places: dict[int, int]) -> None:
-        """The lines of some of the steps; places: those of the nodes that parts of a long function hand on."""
+        """The lines of some of the steps; places: of the nodes that parts of a function hand on."""
         tape, kind, out = self.tape, wide(DOUBLE, width), code["out"]
         values: dict[int, Value] = {}
 
@@ -175,7 +169,6 @@ class Steps:
         code.give_back()
 
     def results(self, code: Code, i: int, value: Callable[[int], Value], width: int) -> dict[int, Value]:
-        """The values that a step makes, by node; value: of a node before it."""
         nodes = self.tape.nodes
         name, arguments = nodes[i]
         if name == "sincos":
@@ -201,7 +194,7 @@ class Steps:
 
 
 def called(code: Code, name: str, values: list[Value], count: int, width: int) -> Value:
-    """Call void name(ptr in, ptr out), lane by lane where it is for one state alone; the place of its results."""
+    """Call void name(ptr in, ptr out), lane by lane what is for one state: the place of its results."""
     taken = code.reserve(wide(DOUBLE, width), len(values))
     out = code.reserve(wide(DOUBLE, width), count)
     for k, x in enumerate(values):

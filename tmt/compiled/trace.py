@@ -1,8 +1,8 @@
-"""A scalar that records arithmetic: run the method once on it, and it yields a tape of operations, which straight.py compiles.
+"""A scalar that records arithmetic: the method run on it once is a tape of operations for straight.py.
 
-The parameters of a model are plain numbers and fold in; terms with a zero or a one disappear; equal subexpressions are
-computed once; signs are carried outward until a sum takes them up; numbers that meet in a sum or a product become one.
-What remains is the arithmetic of this one model.
+The parameters of a model are plain numbers and fold in; terms with a zero or a one disappear; equal
+subexpressions are computed once; signs are carried outward until a sum takes them up; numbers that meet in a
+sum or a product become one. What remains is the arithmetic of this one model.
 """
 
 import math
@@ -18,7 +18,6 @@ Function = Callable[[Scalar], Scalar]
 
 
 def folded(of_float: Function, function: Function) -> Function:
-    """A function of a number, of a float by the C library."""
     return lambda x: of_float(x) if isinstance(x, float) else function(x)
 
 
@@ -50,7 +49,6 @@ class Tape:
         return [self.node("input", name) for name in names]
 
     def call(self, function: str, arguments: Iterable[Scalar], count: int) -> list["Expression"]:
-        """The `count` results of a function of that name, which compiled code calls."""
         call = self.node("call", function, *(self.lift(a).i for a in arguments))
         return [self.node("item", call.i, k) for k in range(count)]
 
@@ -147,7 +145,6 @@ class Tape:
         return chosen
 
     def needed(self, outputs: list["Expression"]) -> list[int]:
-        """The nodes on which the outputs depend, in order."""
         needed: set[int] = set()
         open_ = [o.i for o in outputs]
         while open_:
@@ -171,6 +168,12 @@ RULES: dict[str, Callable[..., "Expression"]] = {
 }  # fmt: skip
 
 
+def operator_of(operation: str, is_reflected: bool = False) -> Callable[["Expression", Scalar], Scalar]:
+    if is_reflected:
+        return lambda self, other: self.apply(operation, other, self)
+    return lambda self, other: self.apply(operation, self, other)
+
+
 class Expression:
     """A node of a tape. number: its value, if it is known without running, else None."""
 
@@ -184,7 +187,6 @@ class Expression:
 
     @property
     def negated(self) -> "Expression | None":
-        """x, if this is -x: else None."""
         operation, arguments = self.tape.nodes[self.i]
         return Expression(self.tape, arguments[0]) if operation == "neg" else None
 
@@ -193,7 +195,7 @@ class Expression:
         return self.tape.nodes[self.i][1][0]
 
     def apply(self, operation: str, *values: Scalar) -> Scalar:
-        """The expression for an operation; NotImplemented if another kind of scalar takes part, which then decides."""
+        """The expression for an operation; NotImplemented where another kind of scalar is to decide."""
         for value in values:
             if type(value) not in SCALARS and not isinstance(value, Real):
                 return NotImplemented
@@ -202,27 +204,10 @@ class Expression:
     def __neg__(self) -> Scalar:
         return self.apply("neg", self)
 
-    def __add__(self, other: Scalar) -> Scalar:
-        return self.apply("+", self, other)
-
-    __radd__ = __add__
-
-    def __mul__(self, other: Scalar) -> Scalar:
-        return self.apply("*", self, other)
-
-    __rmul__ = __mul__
-
-    def __sub__(self, other: Scalar) -> Scalar:
-        return self.apply("-", self, other)
-
-    def __rsub__(self, other: Scalar) -> Scalar:
-        return self.apply("-", other, self)
-
-    def __truediv__(self, other: Scalar) -> Scalar:
-        return self.apply("/", self, other)
-
-    def __rtruediv__(self, other: Scalar) -> Scalar:
-        return self.apply("/", other, self)
+    __add__ = __radd__ = operator_of("+")
+    __mul__ = __rmul__ = operator_of("*")
+    __sub__, __rsub__ = operator_of("-"), operator_of("-", is_reflected=True)
+    __truediv__, __rtruediv__ = operator_of("/"), operator_of("/", is_reflected=True)
 
 
 SCALARS = (Expression, float, int)

@@ -15,12 +15,11 @@ and force of S along the directions inward. The number of operations of the acce
 of Mbar with n times the length of the paths to the world.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
-from .composite import Distribution, rounded, turning
+from .composite import Distribution, Round, rounded, turning
 from .mechanism import AnyTree, turn_in_parent
-from .method import with_rotors
+from .method import with_diagonal, with_rotors
 from .vectors import IDENTITY, ZERO, Matrix, Record, Rows, Scalar, Scalars, Values, Vector, combined, outer
 
 
@@ -33,7 +32,6 @@ class Symmetric(NamedTuple):
         return Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ v
 
     def less_outer(self, a: Vector, b: Vector) -> "Symmetric":
-        """The matrix less a b', a along b."""
         off = Vector(a.y * b.z, a.x * b.z, a.x * b.y)
         return Symmetric(self.diagonal - Vector(a.x * b.x, a.y * b.y, a.z * b.z), self.off - off)
 
@@ -48,7 +46,6 @@ class Screw(NamedTuple):
         return Screw(self.turn * factor, self.shift * factor)
 
     def dot(self, other: "Screw") -> Scalar:
-        """The power of a force along a motion."""
         return self.turn.dot(other.turn) + self.shift.dot(other.shift)
 
     def times(self, other: "Screw") -> "Screw":
@@ -60,8 +57,6 @@ STILL = Screw(ZERO, ZERO)
 
 
 class Frame(NamedTuple):
-    """A joint's frame and its motion at qdd = 0, about O."""
-
     turn: Matrix
     r: Vector  # of its origin
     omega: Vector
@@ -88,7 +83,6 @@ class Rigid(NamedTuple):
     m: Scalar
 
     def accelerated(self, motion: Screw) -> Screw:
-        """The force that gives it this acceleration."""
         moment = self.J.times(motion.turn) + self.s.cross(motion.shift)
         return Screw(moment, motion.turn.cross(self.s) + motion.shift * self.m)
 
@@ -141,9 +135,7 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, 
                 for other, along in zip(joints[inward].speeds, frames[inward].directions):
                     if other <= k:
                         M[k][other] = M[other][k] = along.dot(force)
-            if tree.armature[k]:
-                M[k][k] = M[k][k] + tree.armature[k]
-    return M, along_speeds(frames, rigid)
+    return with_diagonal(M, tree.armature), along_speeds(frames, rigid)
 
 
 def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
@@ -152,12 +144,10 @@ def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> V
 
 
 def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> Values:
-    """The force on what each joint carries, along the direction of each speed, (nv,)."""
     return [d.dot(body.force) for frame, body in zip(frames, rigid) for d in frame.directions]
 
 
 def gathered(tree: AnyTree, own: list[Record]) -> list[Record]:
-    """The sum of all that each joint carries, from what it carries itself."""
     result = list(own)
     for i in reversed(range(len(result))):
         if tree.parent[i] >= 0:
@@ -166,9 +156,9 @@ def gathered(tree: AnyTree, own: list[Record]) -> list[Record]:
 
 
 def outward(
-    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars = (), number: Callable[..., Scalar] = float
+    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars = (), number: Round = float
 ) -> tuple[list[Frame], list[Rigid]]:
-    """The frames of all joints, and what each carries itself; qdd: (), none; number: as in composite.py."""
+    """The frames of all joints, and what each carries itself; qdd: (), none."""
     distributions = rounded(tree, number)[0]
     frames: list[Frame] = []
     rigid: list[Rigid] = []
@@ -203,7 +193,6 @@ def outward(
 
 
 def about_point(own: Distribution, frame: Frame) -> Rigid:
-    """What a joint carries itself, about O."""
     m, r, omega, omegad, a = own.mass, frame.r, frame.omega, frame.omegad, frame.a
     turned = frame.turn @ own.moment
     s = turned + r * m

@@ -20,16 +20,16 @@ from typing import NamedTuple
 
 import mpmath
 
+from .coordinates import Joint
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
-from .method import with_rotors
+from .method import with_diagonal, with_rotors
 from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, combined, outer, total_vector
 
 Placement = tuple[Vector, Matrix]  # origin (m) and turn of a frame in its parent's
+Round = Callable[..., Scalar]  # float or mpmath.mpf, to which what is exact is rounded once
 
 
 class Distribution(NamedTuple):
-    """Mass about the origin of a frame, in its axes."""
-
     mass: Scalar  # kg
     moment: Vector  # kg m
     second: Matrix  # kg m2, symmetric
@@ -43,12 +43,10 @@ class Distribution(NamedTuple):
         return Distribution(self.mass, moment, self.second + outer(by, self.moment) + outer(moment, by))
 
     def turned(self, turn: Matrix) -> "Distribution":
-        """The distribution in other axes; `turn` takes components to them."""
         return Distribution(self.mass, turn @ self.moment, turn @ self.second @ turn.transposed)
 
     @property
     def inertia(self) -> Matrix:
-        """I = tr(S) 1 - S, kg m2."""
         (xx, xy, xz), (_, yy, yz), (_, _, zz) = self.second
         return Matrix([[yy + zz, -xy, -xz], [-xy, xx + zz, -yz], [-xz, -yz, xx + yy]])
 
@@ -71,7 +69,7 @@ class Distribution(NamedTuple):
         second = Matrix([[u, 0, 0], [0, u, 0], [0, 0, u]]) - outer(axis, axis * u)
         return Distribution(0, NOTHING.moment, second)
 
-    def rounded(self, number: Callable[..., Scalar]) -> "Distribution":
+    def rounded(self, number: Round) -> "Distribution":
         """The distribution in another type of number, each rounded once; zeros stay plain."""
 
         def one(x: Scalar) -> Scalar:
@@ -95,8 +93,8 @@ def fraction(x: Scalar) -> Scalar:
         return Fraction(x)
     if not isinstance(x, mpmath.mpf):
         return x
-    sign, digits, power, _ = x._mpf_
-    return (-1) ** sign * int(digits) * Fraction(2) ** int(power)
+    digits, power = x.man_exp  # without the sign
+    return Fraction(int(digits if x > 0 else -digits)) * Fraction(2) ** int(power)
 
 
 def exact_vector(components: Scalars) -> Vector:
@@ -141,16 +139,17 @@ def carried_by_joint(tree: AnyTree) -> list[Distribution]:
 
 
 class Motion(NamedTuple):
-    """A frame's motion at qdd = 0, in its own axes."""
-
     a: Vector  # of its origin
     omega: Vector
     omegad: Vector
     P: Matrix
 
 
+def along_axes(tree: AnyTree, joint: Joint, rates: Scalars) -> Vector:
+    return total_vector(Vector(*axis) * rate for axis, rate in zip(tree.axis[joint.qd], rates[joint.qd]))
+
+
 def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalars = ()) -> list[Motion]:
-    """The motions of the joints' frames; qdd: (), none."""
     result: list[Motion] = []
     for i, (joint, (offset, turn)) in enumerate(zip(tree.coordinates.joints, placements)):
         a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
@@ -158,24 +157,21 @@ def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalar
             parent, to_child = result[tree.parent[i]], turn.transposed
             a = parent.a + parent.P @ offset
             omega, omegad = to_child @ parent.omega, to_child @ parent.omegad
-        axes = zip(tree.axis[joint.qd], qd[joint.qd])
-        moving = total_vector(Vector(*axis) * rate for axis, rate in axes)
+        moving = along_axes(tree, joint, qd)
         if joint.kind == "slide":
             a = a + omega.cross(moving * 2.0)
         else:
             a, omegad, omega = turn.transposed @ a, omegad + omega.cross(moving), omega + moving
         if qdd:
-            axes = zip(tree.axis[joint.qd], qdd[joint.qd])
-            more = total_vector(Vector(*axis) * rate for axis, rate in axes)
+            more = along_axes(tree, joint, qdd)
             a, omegad = (a + more, omegad) if joint.kind == "slide" else (a, omegad + more)
         result.append(Motion(a, omega, omegad, turning(omega, omegad)))
     return result
 
 
 def mass_matrix_and_bias(
-    tree: AnyTree, q: Scalars, qd: Scalars, number: Callable[..., Scalar] = float
+    tree: AnyTree, q: Scalars, qd: Scalars, number: Round = float
 ) -> tuple[Rows, Values]:
-    """Mbar and h, as in method.py; number: float or mpmath.mpf, to which what is exact is rounded once."""
     n, joints, placements = len(tree.axis), tree.coordinates.joints, placed(tree, q)
     axes = [Vector(*axis) for axis in tree.axis]
     own, uneven, even = map(list, rounded(tree, number))
@@ -187,8 +183,6 @@ def mass_matrix_and_bias(
         for k in joints[i].speeds:
             force, moment = carried.at_unit_acceleration(kind, axes[k])
             M[k][k] = axes[k].dot(force if kind == "slide" else moment)
-            if tree.armature[k]:
-                M[k][k] = M[k][k] + tree.armature[k]
             for other in range(joints[i].qd.start, k):  # of the same ball
                 M[k][other] = M[other][k] = axes[other].dot(moment)
             j = i
@@ -202,12 +196,11 @@ def mass_matrix_and_bias(
             offset, turn = placements[i]
             carried = combined(uneven[i].turned(turn), even[i]).moved(offset)
             uneven[parent] = combined(uneven[parent], carried)
-    return M, inward(tree, placements, motions(tree, placements, qd), own)
+    h = inward(tree, placements, motions(tree, placements, qd), own)
+    return with_diagonal(M, tree.armature), h
 
 
-def generalized_force(
-    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
-) -> Values:
+def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float) -> Values:
     placements = placed(tree, q)
     own, moving = rounded(tree, number)[0], motions(tree, placements, qd, qdd)
     return with_rotors(tree, inward(tree, placements, moving, own), qdd)
@@ -236,14 +229,14 @@ def inward(
     return result
 
 
-def rounded(tree: AnyTree, number: Callable[..., Scalar]) -> tuple[list[Distribution], ...]:
-    """As rounded_once: fractions take their time, but other numbers than floats may have other digits from call to call."""
+def rounded(tree: AnyTree, number: Round) -> tuple[list[Distribution], ...]:
+    """As rounded_once, which holds floats alone: other numbers may have other digits in another call."""
     parts = rounded_once if number is float and isinstance(tree, Hashable) else rounded_once.__wrapped__
     return parts(tree, number)
 
 
 @lru_cache(maxsize=64)
-def rounded_once(tree: AnyTree, number: Callable[..., Scalar]) -> tuple[list[Distribution], ...]:
+def rounded_once(tree: AnyTree, number: Round) -> tuple[list[Distribution], ...]:
     """What each joint carries itself, its part that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [NOTHING] * len(exact)
@@ -255,7 +248,6 @@ def rounded_once(tree: AnyTree, number: Callable[..., Scalar]) -> tuple[list[Dis
 
 
 def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> tuple[Vector, Vector]:
-    """Force and moment about the origin of the parent's frame, in its axes."""
     force = turn @ force
     return force, turn @ moment + offset.cross(force)
 
@@ -272,6 +264,5 @@ def turning(omega: Vector, omegad: Vector) -> Matrix:
 
 
 def vee(matrix: Matrix) -> Vector:
-    """Integral of x cross P x dm, for the matrix P S."""
     (_, xy, xz), (yx, _, yz), (zx, zy, _) = matrix
     return Vector(zy - yz, xz - zx, yx - xy)

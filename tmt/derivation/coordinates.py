@@ -14,19 +14,17 @@ IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x o
 from functools import lru_cache
 from typing import NamedTuple
 
-from .vectors import Scalars, Values, Vector, arctan, cos, sin, sqrt
+from .vectors import Scalars, Values, Vector, arctan, cos, plus, sin, sqrt
 
 KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
 TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined
 
 
 class Flat:
-    """Coordinates of hinges and slides: positions move like numbers, and speeds are their rates."""
-
     balls: tuple["Joint", ...] = ()
 
     def move(self, q: Scalars, u: Scalars) -> Values:
-        return [x + y for x, y in zip(q, u)]
+        return plus(q, u)
 
     def rates(self, u: Scalars, qd: Scalars) -> Values:
         return list(qd)
@@ -131,7 +129,6 @@ def coordinates_of(kinds: tuple[str, ...]) -> Coordinates:
 
 
 def product(p: Scalars, r: Scalars) -> Values:
-    """The product p o r of two quaternions: the turn r, then p."""
     (a, x, y, z), (b, u, v, w) = p, r
     return [
         a * b - x * u - y * v - z * w,
@@ -142,7 +139,6 @@ def product(p: Scalars, r: Scalars) -> Values:
 
 
 def conjugate(p: Scalars) -> Values:
-    """The inverse of a quaternion of length 1."""
     return [p[0], *(x * -1.0 for x in p[1:])]
 
 
@@ -152,7 +148,6 @@ def normalized(p: Scalars) -> Values:
 
 
 def exponential(u: Scalars) -> Values:
-    """The quaternion that turns by |u| rad about u."""
     x, y, z = u
     half = sqrt(x * x + y * y + z * z + TINY) * 0.5
     share = sin(half) / half * 0.5

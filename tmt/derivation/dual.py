@@ -26,7 +26,6 @@ class Dual:
         return Dual(value, slope, self.level)
 
     def parts(self, other: Scalar) -> tuple[Scalar, Scalar]:
-        """Value and slope of another scalar at this level; a constant has slope 0."""
         return (other.value, other.slope) if getattr(other, "level", None) == self.level else (other, 0.0)
 
     def outranked(self, other: Scalar) -> bool:
@@ -83,7 +82,6 @@ class Dual:
 
 
 def seeded(values: Iterable[Scalar], slopes: Iterable[Scalar]) -> list[Dual]:
-    """Dual numbers of one new level with these values and slopes."""
     level = next(levels)
     return [Dual(value, slope, level) for value, slope in zip(values, slopes)]
 
@@ -91,7 +89,7 @@ def seeded(values: Iterable[Scalar], slopes: Iterable[Scalar]) -> list[Dual]:
 def jacobian(
     function: Callable[[Values], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = ()
 ) -> Rows:
-    """d function_i / d x_j (rows i, columns j) of lists of scalars; directions: in place of each x_j alone."""
+    """d function_i / d x_j (rows i, columns j); directions: in place of each x_j alone."""
     columns = []
     for direction in directions or unit_vectors(len(x)):
         nudged = seeded(x, direction)
@@ -105,9 +103,5 @@ def unit_vectors(n: int) -> list[list[float]]:
 
 sin.register(Dual, lambda angle: angle.new(sin(angle.value), cos(angle.value) * angle.slope))
 cos.register(Dual, lambda angle: angle.new(cos(angle.value), sin(angle.value) * angle.slope * -1.0))
-sqrt.register(Dual, lambda x: _root(x, sqrt(x.value)))
+sqrt.register(Dual, lambda x: x.new(root := sqrt(x.value), x.slope / (root * 2.0)))
 arctan.register(Dual, lambda x: x.new(arctan(x.value), x.slope / (1.0 + x.value * x.value)))
-
-
-def _root(x: Dual, root: Scalar) -> Dual:
-    return x.new(root, x.slope / (root * 2.0))

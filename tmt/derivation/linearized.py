@@ -1,30 +1,33 @@
-"""How Mbar qdd + h changes with movements and speeds, in closed form: in world axes about one point, as in articulated.py.
+"""How Mbar qdd + h changes with movements and speeds: in closed form, in world axes as in articulated.py.
 
-A movement along the direction S_k = (axis, shift) of a speed takes all that its joint carries along as one body, and so turns
-velocity and acceleration of what is carried, less those of the frame before (omega, u of its point at O, omegad, ud). What
-is left are two motions, with x the product of motions, (omega, u) x (axis, shift) = (omega x axis, omega x shift + u x axis):
+A movement along the direction S_k = (axis, shift) of a speed takes all that its joint carries along as one
+body, and so turns velocity and acceleration of what is carried, less those of the frame before (omega, u of
+its point at O, omegad, ud). What is left are two motions, with x the product of motions, (omega, u) x (axis,
+shift) = (omega x axis, omega x shift + u x axis):
 
     Y_k = v x S_k        Z_k = a x S_k + v x Y_k        v, a of the frame before, a with -g.
 
-A motion X that is added to the velocity changes force and moment of a mass distribution by I X + B X alone: the mass at a point
-r feels 2 X_omega x its velocity, so that
+A motion X that is added to the velocity changes force and moment of a mass distribution by I X + B X alone:
+the mass at a point r feels 2 X_omega x its velocity, so that
 
     B X = (K X_omega, 2 X_omega x p),   K = 2 (tr(G) 1 - G'),   G = integral of r rd' dm,   p its momentum.
 
-With I, B and the force F of all that the joint carries, and Y + W = v x S + v_own x S, its moment and force change by
+With I, B and the force F of all that the joint carries, and Y + W = v x S + v_own x S, its moment and force
+change by
 
     I Z + B Y + S x* F  with the movement        I (Y + W) + B S  with the speed,
 
-along each direction inward; of the torque at joints outward by I Z + B Y and I (Y + W) + B S, with their own I and B.
-Sums of this kind, over six coordinates: Singh, Russell, Wensing, IEEE Robotics and Automation Letters 7 (2022), 1784.
+along each direction inward; of the torque at joints outward by I Z + B Y and I (Y + W) + B S, with their own
+I and B. Sums of this kind, over six coordinates: Singh, Russell, Wensing, IEEE Robotics and Automation
+Letters 7 (2022), 1784.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 from .articulated import STILL, Frame, Rigid, Screw, gathered, outward
+from .composite import Round
 from .mechanism import AnyTree
-from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Vector, combined, outer
+from .vectors import ZERO, Matrix, Rows, Scalars, Vector, combined, outer
 
 
 class Momentum(NamedTuple):
@@ -32,11 +35,9 @@ class Momentum(NamedTuple):
     p: Vector
 
     def force(self, turn: Vector) -> Screw:
-        """B X, of the angular part of X."""
         return Screw(self.K @ turn, turn.cross(self.p * 2.0))
 
     def along(self, direction: Screw) -> Vector:
-        """S' B, by the angular part of X."""
         return self.K.transposed @ direction.turn + (self.p * 2.0).cross(direction.shift)
 
 
@@ -46,8 +47,8 @@ def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
     second = Matrix([[half - xx, -xy, -xz], [-xy, half - yy, -yz], [-xz, -yz, half - zz]])
     spin = Matrix([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     G, doubled = outer(u, body.s) + spin @ second, 2.0 * u.dot(body.s)
-    K = Matrix([row * -2.0 for row in G]) + Matrix(
-        [[doubled, 0.0, 0.0], [0.0, doubled, 0.0], [0.0, 0.0, doubled]]
+    K = Matrix([[doubled, 0.0, 0.0], [0.0, doubled, 0.0], [0.0, 0.0, doubled]]) - Matrix(
+        [row * 2.0 for row in G]
     )
     return Momentum(K, u * body.m + omega.cross(body.s))
 
@@ -61,10 +62,8 @@ def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
     return result
 
 
-def rates(
-    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Callable[..., Scalar] = float
-) -> tuple[Rows, Rows]:
-    """Derivatives of Mbar qdd + h by movements of q and by qd, (nv rows of nv) each; of a ball's by turns in its own axes."""
+def rates(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float) -> tuple[Rows, Rows]:
+    """Derivatives of Mbar qdd + h by movements of q (of a ball turns in its axes) and qd, (nv, nv) each."""
     n, joints = len(qd), tree.coordinates.joints
     frames, own = outward(tree, q, qd, qdd, number)
     rigid, v = gathered(tree, own), velocities(tree, frames, qd)

@@ -65,16 +65,16 @@ class Mechanism(Generic[Number]):
         return bool(self.position_gain or self.speed_gain)
 
     def site_of(self, name: str) -> Site:
-        """The site of that name, or the frame of the joint that carries the body of that name; KeyError if there is neither."""
+        """The site of that name, or the frame of the joint of that body; ValueError if there is neither."""
         if name in self.site_names:
             k = self.site_names.index(name)
             return Site(self.site_joint[k], self.site_offset[k], self.site_turn[k])
         if name not in self.body_names:
-            raise KeyError(name)
+            known = dict.fromkeys([*self.site_names, *self.body_names])
+            raise ValueError(f"there is no site or body {name!r}; the model has {', '.join(known)}")
         return Site(self.body_joint[self.body_names.index(name)], (0.0,) * 3, UNIT)
 
     def path(self, joint: int) -> list[int]:
-        """The joint and those before it, from the tip inward; none of -1, the world."""
         joints = []
         while joint >= 0:
             joints.append(joint)
@@ -82,14 +82,11 @@ class Mechanism(Generic[Number]):
         return joints
 
     def moves(self, body: int) -> list[bool]:
-        """Which of the n joints move the body: those on its path to the world."""
         path = self.path(self.body_joint[body])
         return [joint in path for joint in range(len(self.parent))]
 
 
 class Site(NamedTuple):
-    """A frame that is fixed to that of a joint, -1: to the world."""
-
     joint: int
     offset: Sequence[Scalar]  # of its origin, in the frame of the joint, m
     turn: Sequence[Sequence[Scalar]]  # its axes as columns, in the frame of the joint

@@ -25,14 +25,27 @@ from typing import NamedTuple
 
 from .dual import jacobian
 from .mechanism import AnyTree, origin_in_parent, turn_in_parent
-from .vectors import IDENTITY, ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, solve, total, total_vector
+from .vectors import (
+    IDENTITY,
+    ZERO,
+    Matrix,
+    Rows,
+    Scalar,
+    Scalars,
+    Values,
+    Vector,
+    minus,
+    plus,
+    solve,
+    total,
+    total_vector,
+    weighted,
+)
 
 Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 
 
 class Frame(NamedTuple):
-    """A joint's frame and its motion, as if qdd were zero."""
-
     origin: Vector  # m
     turn: Matrix  # body axes -> inertial axes
     axes: list[Vector]  # of its speeds, inertial axes
@@ -108,7 +121,8 @@ def carried(frame: Frame, point: Vector) -> tuple[Vector, Vector]:
 def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Body]:
     """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest).
 
-    With qdd v_conv and w_conv are the accelerations themselves: the bias of such bodies is Mbar qdd + h without the armature.
+    With qdd v_conv and w_conv are the accelerations themselves: the bias of such bodies is Mbar qdd + h
+    without the armature.
     """
     frames = joint_frames(tree, q, qd, qdd)
     result = []
@@ -149,10 +163,7 @@ def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> Rows:
             force, moment = b.mass * b.T[j], b.inertia @ b.B[j]
             for i in moving:
                 M[i][j] = M[i][j] + (b.T[i].dot(force) + b.B[i].dot(moment))
-    for i, rotor in enumerate(armature):
-        if rotor:
-            M[i][i] = M[i][i] + rotor
-    return M
+    return with_diagonal(M, armature)
 
 
 def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Values:
@@ -173,12 +184,10 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, 
 
 
 def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
-    """Mbar qdd + h (nv, N m)."""
     return with_rotors(tree, bias(bodies(tree, q, qd, qdd), tree.gravity), qdd)
 
 
 def with_rotors(tree: AnyTree, force: Scalars, qdd: Scalars) -> Values:
-    """A force (nv,) and that which accelerates the armature."""
     return [f + rotor * a if rotor else f for f, rotor, a in zip(force, tree.armature, qdd)]
 
 
@@ -193,7 +202,6 @@ def bias_rates(tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matri
 
 
 def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
-    """The stiffness of the spring and the movement from its rest, rad or m, for each speed, (nv,)."""
     movement = tree.coordinates.difference(q, tree.rest)
     joints = zip(tree.stiffness, tree.coordinates.joints)
     return [(stiffness, movement[k]) for stiffness, joint in joints for k in joint.speeds]
@@ -209,18 +217,17 @@ def spring_torque(tree: AnyTree, q: Scalars) -> Values:
 def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> Values:
     """P q + S qd (nv, N m or N), which a linear controller takes off; no entry of P is that of a ball."""
     positions = [q[i] for i in tree.coordinates.first_positions]
-    terms: Rows = [[] for _ in qd]
+    result = [0.0] * len(qd)
     for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
-        for terms_of_speed, row in zip(terms, gain):
-            terms_of_speed += [g * x for g, x in zip(row, values) if g]
-    return [total(terms_of_speed) for terms_of_speed in terms]
+        result = plus(result, [weighted(row, values) for row in gain]) if gain else result
+    return result
 
 
-def with_diagonal(gains: Sequence[Scalars], diagonal: Scalars) -> Rows:
-    """A matrix of gains, if there are any, with these numbers added on its diagonal."""
-    rows = [list(row) for row in gains] or [[0.0] * len(diagonal) for _ in diagonal]
+def with_diagonal(matrix: Sequence[Scalars], diagonal: Scalars) -> Rows:
+    rows = [list(row) for row in matrix] or [[0.0] * len(diagonal) for _ in diagonal]
     for i, x in enumerate(diagonal):
-        rows[i][i] += x
+        if x:
+            rows[i][i] = rows[i][i] + x
     return rows
 
 
@@ -228,9 +235,9 @@ def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scala
     """Qbar = tau - D qd - k (q - rest) - P q - S qd - h (nv, N m)."""
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
     if tree.has_springs:
-        Qbar = [Q - s for Q, s in zip(Qbar, spring_torque(tree, q))]
+        Qbar = minus(Qbar, spring_torque(tree, q))
     if tree.has_gains:
-        Qbar = [Q - f for Q, f in zip(Qbar, fed_back(tree, q, qd))]
+        Qbar = minus(Qbar, fed_back(tree, q, qd))
     return Qbar
 
 

@@ -1,7 +1,6 @@
 """Every quantity of a state, in one table: what it takes, its shape and unit, how it follows from the bodies.
 
-The literal form (literal.py), the compiled one (compiled/evaluator.py) and the truth in many digits
-(exact/many.py) are all served from it.
+The literal form, the compiled one and the truth in many digits (exact/many.py) are all served from it.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,11 +10,10 @@ from typing import Any, NamedTuple
 from . import method
 from .dual import jacobian, unit_vectors
 from .mechanism import AnyTree
-from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values
+from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values, added
 
-Step = Callable[
-    [Values, Values, Values, Scalar], tuple[Values, Values]
-]  # (q, qd, tau, dt): q, qd one dt later
+# (q, qd, tau, dt): q, qd one dt later
+Step = Callable[[Values, Values, Values, Scalar], tuple[Values, Values]]
 Rates = tuple[Rows, Rows]  # by movements and by speeds
 
 
@@ -33,12 +31,13 @@ LITERAL = Form(method.mass_matrix_and_bias, method.generalized_force)
 class State:
     """A state of a tree, and what follows from it: each part once.
 
-    given: q and, by default at rest and without torque, qd and tau; qdd, by default those under tau; dt of a step. name: of the
-    frame that is asked for.
+    given: q and, by default at rest and without torque, qd and tau; qdd, by default those under tau; dt of a
+    step. name: of the frame that is asked for.
     """
 
     def __init__(
-        self, tree: AnyTree, given: Mapping[str, Scalars], form: Form = LITERAL, name: str = "", step: Step | None = None
+        self, tree: AnyTree, given: Mapping[str, Scalars], form: Form = LITERAL, name: str = "",
+        step: Step | None = None,
     ):  # fmt: skip
         nothing = [0.0] * len(tree.axis)
         self.tree, self.q, self.moves = tree, given["q"], "qd" in given
@@ -86,7 +85,6 @@ class State:
         return method.inverse_dynamics(self.tree, self.q, self.qd, self.force(self.q, self.qd))
 
     def force(self, q: Scalars, qd: Scalars) -> Values:
-        """Mbar qdd + h."""
         return self.form.generalized_force(self.tree, q, qd, self.qdd)
 
     @property
@@ -99,7 +97,6 @@ class State:
 
     @cached_property
     def torque_rates(self) -> Rates:
-        """The same of the inverse dynamics."""
         by_movement, by_speed = self.force_rates
         nothing, qd = [0.0] * len(self.qd), list(self.qd)
         if self.tree.has_springs or self.tree.position_gain:
@@ -109,13 +106,11 @@ class State:
         return by_movement, added(by_speed, damped)
 
     def by_movement(self, function: Callable[[Values], Values]) -> Rows:
-        """Derivatives of a function of q by dual numbers, nv rows of nv."""
         moved = [self.tree.coordinates.component_rates(self.q, u) for u in unit_vectors(len(self.qd))]
         return jacobian(function, list(self.q), moved)
 
     @property
     def derivatives(self) -> list[Rows]:
-        """dqdd/dq, dqdd/dqd, dqdd/dtau, dtau/dq, dtau/dqd: from Mbar dqdd = dtau at the accelerations."""
         solved = [self.factors.solve_columns(rows) for rows in self.torque_rates]
         changes = [[[x * -1.0 for x in row] for row in rows] for rows in solved]
         return [*changes, self.factors.inverted(), *self.torque_rates]
@@ -134,7 +129,7 @@ class State:
 
     @property
     def step_derivatives(self) -> Rows:
-        """[A B], (2 nv, 3 nv): of the state after a step by a state (movement, qd) and the torque before it, by dual numbers."""
+        """[A B], (2 nv, 3 nv): the state after a step by that before it (movement, qd) and by the torque."""
         assert self.step is not None
         step, coordinates, dt = self.step, self.tree.coordinates, self.given["dt"][0]
         nq, n, nothing = len(self.q), len(self.qd), [0.0] * len(self.q)
@@ -150,17 +145,13 @@ class State:
         return [list(row) for row in zip(*moved)]
 
 
-def added(first: Rows, second: Rows) -> Rows:
-    return [[x + y for x, y in zip(*rows)] for rows in zip(first, second)]
-
-
 class Quantity(NamedTuple):
     takes: tuple[str, ...]  # of "q", "qd", "tau" or "qdd", "dt"
     shape: tuple[int | str, ...]  # m bodies, nv speeds; 2nv and 3nv
     unit: str
     of: Callable[[State], Any]  # -> nested lists of scalars in that shape
     parts: tuple[str, ...] = ()  # the names of the arrays of which there are several, in that order
-    # what its full name says after a colon, as in frame_pose:hand and step_derivatives:rk4: a frame or a method
+    # what its full name says after a colon (frame_pose:hand, step_derivatives:rk4): a frame or a method
     argument: str = ""
     is_long: bool = False  # it has many operations: it is compiled only where it is asked for by name
     has_forms: bool = True  # it follows from Mbar or h, whose sums have several orders
@@ -188,7 +179,9 @@ QUANTITIES = {
     "inverse_mass_matrix": Quantity(Q, ("nv", "nv"), "1/(kg m2)", lambda s: s.factors.inverted()),
     "bias": Quantity(QD, ("nv",), "N m", lambda s: s.bias),
     "gravity_balance": Quantity(Q, ("nv",), "N m", lambda s: s.gravity_balance),
-    "spring_torque": Quantity(Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q), has_forms=False),
+    "spring_torque": Quantity(
+        Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q), has_forms=False
+    ),
     "acceleration": Quantity(TAU, ("nv",), "rad/s2", lambda s: s.acceleration),
     "inverse_dynamics": Quantity(QDD, ("nv",), "N m", lambda s: s.inverse_dynamics),
     "derivatives": Quantity(TAU, (5, "nv", "nv"), "SI", lambda s: s.derivatives, BY_STATE, is_long=True),
@@ -203,7 +196,7 @@ QUANTITIES = {
     ),
     "frame_jacobian": Quantity(
         Q, (6, "nv"), "m/rad; 1", lambda s: s.frame.jacobian, argument="frame", has_forms=False,
-        title="Velocity of a frame's origin, then its angular velocity, for unit speeds, inertial frame, shape (6, nv).",
+        title="Velocity of a frame's origin and angular one, for unit speeds, inertial frame, shape (6, nv).",
     ),
     "frame_convective": Quantity(
         QD, (6,), "m/s2; rad/s2", lambda s: s.frame.convective, argument="frame", has_forms=False,
@@ -222,14 +215,12 @@ def quantity_of(name: str) -> Quantity:
 
 
 def is_quantity(name: object) -> bool:
-    """Whether it is the full name of a quantity, as text."""
     if not isinstance(name, str) or name.partition(":")[0] not in QUANTITIES:
         return False
     return bool(quantity_of(name).argument) == (":" in name)
 
 
 def what_is_known(name: object) -> str:
-    """What a message says of a name that is no quantity's."""
     if isinstance(name, str) and name in QUANTITIES:
         return f"the name of a {QUANTITIES[name].argument} is expected after a colon, {name}:NAME"
     return f"known are {', '.join(PLAIN)}"

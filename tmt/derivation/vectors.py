@@ -17,8 +17,6 @@ Record = TypeVar("Record", bound=NamedTuple)
 Values = list[Scalar]
 Rows = list[Values]
 Scalars = Sequence[Scalar] | NDArray[Any]
-
-
 # of a scalar of any registered type, angles in rad
 sin, cos, sqrt, arctan = map(singledispatch, (np.sin, np.cos, np.sqrt, np.arctan))
 sin.register(mpmath.mpf, mpmath.sin)
@@ -28,8 +26,6 @@ arctan.register(mpmath.mpf, mpmath.atan)
 
 
 class Vector:
-    """Three scalars, the components of a vector in one frame."""
-
     __slots__ = ("x", "y", "z")
     __array_ufunc__ = None  # else ndarray * Vector would be taken apart by NumPy
 
@@ -100,7 +96,6 @@ IDENTITY = Matrix([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 def outer(a: Vector, b: Vector) -> Matrix:
-    """a b'."""
     return Matrix([b * component for component in a])
 
 
@@ -133,8 +128,8 @@ def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
 class Factors:
     """A symmetric positive definite matrix, given by rows, as U D U', from the last row to the first.
 
-    Without square roots or pivots (none are needed: it is positive definite). In that order a joint meets only its ancestors:
-    zeros between branches stay zeros, as in MuJoCo.
+    Without square roots or pivots (none are needed: it is positive definite). In that order a joint meets
+    only its ancestors: zeros between branches stay zeros, as in MuJoCo.
     """
 
     def __init__(self, matrix: Sequence[Scalars]):
@@ -159,11 +154,9 @@ class Factors:
         return x
 
     def solve_columns(self, right: Sequence[Scalars]) -> Rows:
-        """Solution X of matrix X = right, both by rows."""
         return [list(row) for row in zip(*[self.solve(column) for column in zip(*right)])]
 
     def inverted(self) -> Rows:
-        """The inverse of the matrix, by rows: one half is computed, and is the other."""
         n = len(self.inverse)
         columns = [self.solve([1.0 if i == j else 0.0 for i in range(n)]) for j in range(n)]
         return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
@@ -190,7 +183,6 @@ def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:
 
 
 def combined(a: Record, b: Record) -> Record:
-    """The sum of two records, field by field."""
     parts = zip(a, b)
     return a._make([combined(x, y) if isinstance(x, tuple) else x + y for x, y in parts])
 
@@ -201,11 +193,26 @@ def is_zero(x: Scalar) -> bool:
 
 
 def total(terms: Iterable[Scalar]) -> Scalar:
-    """Sum of scalars of any type, 0.0 if there are none."""
     return sum(terms, 0.0)
 
 
+def weighted(weights: Iterable[Scalar], values: Iterable[Scalar]) -> Scalar:
+    """The sum of weights times values, of those that are not plain zeros; 0.0 where all are."""
+    return total(weight * value for weight, value in zip(weights, values) if weight)
+
+
+def plus(first: Scalars, second: Scalars) -> Values:
+    return [a + b for a, b in zip(first, second)]
+
+
+def minus(first: Scalars, second: Scalars) -> Values:
+    return [a - b for a, b in zip(first, second)]
+
+
+def added(first: Sequence[Scalars], second: Sequence[Scalars]) -> Rows:
+    return [plus(*rows) for rows in zip(first, second)]
+
+
 def total_vector(vectors: Iterable[Vector]) -> Vector:
-    """Sum of vectors: a single one is itself."""
     first, *more = vectors
     return sum(more, first)

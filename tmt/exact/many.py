@@ -23,23 +23,19 @@ EXACT = Form(
 
 
 class Pairs(NamedTuple):
-    """Exact values: the sum of two doubles, (states, ...) each."""
-
     high: np.ndarray
     low: np.ndarray
 
     def part(self, k: int | None) -> "Pairs":
-        """One of several arrays of a quantity; None: all."""
         return self if k is None else Pairs(self.high[:, k], self.low[:, k])
 
     def distance(self, values: np.ndarray) -> np.ndarray:
-        """|values - exact|, (states, ...)."""
         with np.errstate(invalid="ignore"):  # a user's own equations may give NaN
             return np.abs((values - self.high) - self.low)
 
 
 def exact_of_many(tree: Tree, name: str, q: np.ndarray, *rates: np.ndarray) -> Pairs:
-    """A quantity, by its full name, at q (states, nq) and qd, tau or qdd (states, nv), dt (states, 1): doubles, taken as exact.
+    """A quantity, by its full name, at q (states, nq), qd, tau or qdd (states, nv), dt (states, 1), as exact.
 
     Shapes and units as in `tmt`.
     """
@@ -56,7 +52,6 @@ def exact_of_many(tree: Tree, name: str, q: np.ndarray, *rates: np.ndarray) -> P
 
 @lru_cache(maxsize=64)
 def traced(tree: Tree, name: str) -> tuple[Equations, list[int]]:
-    """The operations of a quantity, and the rows of its numbers."""
     tape, n, takes = Tape(mpmath.mpf), len(tree.axis), quantity_of(name).takes
     with mpmath.workdps(DIGITS):
         exact = exact_tree(tree, mpmath.mpf)

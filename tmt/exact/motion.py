@@ -1,8 +1,8 @@
-"""The true motion, from which the error of every method is measured: Taylor's method in pairs of doubles, some 32 digits.
+"""The true motion, which errors of methods are measured from: Taylor's method in pairs of doubles.
 
-The method is traced on numbers of many digits, and series.py reads what it traced: nothing is compiled for a robot. What is
-lost is rounding, about 1e-30 times the growth of a small difference along the motion; `truth` shows it by a second run. The
-torque is constant: where it jumps a run ends and another begins.
+The method is traced on numbers of many digits, and series.py reads what it traced: nothing is compiled for a
+robot. What is lost is rounding, about 1e-30 times the growth of a small difference along the motion; `truth`
+shows it by a second run. The torque is constant: where it jumps a run ends and another begins.
 """
 
 import math
@@ -37,8 +37,8 @@ MOST_OPERATIONS = 20_000_000  # of all steps of a run: some 20 s
 BESIDE = 100  # operations, as long as the rest of a step takes
 SEEN = 200  # steps by which it is seen whether a run would take more
 OPERATIONS = {
-    "+": [series.ADD], "-": [series.SUBTRACT], "neg": [series.NEGATIVE], "*": [series.MULTIPLY], "/": [series.DIVIDE],
-    "sqrt": [series.ROOT], "sincos": [series.SLOPE, series.SINE, series.COSINE],
+    "+": [series.ADD], "-": [series.SUBTRACT], "neg": [series.NEGATIVE], "*": [series.MULTIPLY],
+    "/": [series.DIVIDE], "sqrt": [series.ROOT], "sincos": [series.SLOPE, series.SINE, series.COSINE],
 }  # fmt: skip
 
 
@@ -47,22 +47,17 @@ class TooManySteps(ValueError):
 
 
 class Path(NamedTuple):
-    """A motion at equal times, each number as the sum of two doubles."""
-
     high: np.ndarray  # (records + 1, nq + nv) q and qd, rad and rad/s
     low: np.ndarray  # (records + 1, nq + nv)
     steps: int
 
 
 class Equations(NamedTuple):
-    """Operations and numbers as series.py reads them."""
-
     code: np.ndarray  # (operations, 4)
     numbers: np.ndarray  # (2, numbers), in the rows after the inputs
     rows: int
 
     def tables(self, inputs: int, width: int) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of `width` coefficients, high and low, with the numbers that are constant."""
         high, low = np.zeros((2, self.rows, width))
         constant = slice(inputs, inputs + self.numbers.shape[1])
         high[constant, 0], low[constant, 0] = self.numbers
@@ -74,24 +69,25 @@ def truth(
 ) -> tuple[Path, float]:
     """The motion, see `trajectory`, and its largest difference from a second run, rad or rad/s.
 
-    The two share neither the order nor, up to 40 speeds, the form of the equations: their difference shows what truncation,
-    rounding and the regrouping of the sums do together.
+    The two share neither the order nor, up to 40 speeds, the form of the equations.
     """
-    first = trajectory(tree, q, qd, tau, dt, steps, every)
     form = "literal" if len(qd) <= MOST_LITERAL else "composite"
-    second = trajectory(tree, q, qd, tau, dt, steps, every, form, OTHER_ORDER)
+    second = trajectory(
+        tree, q, qd, tau, dt, steps, every, form, OTHER_ORDER
+    )  # which would take too long sooner
+    first = trajectory(tree, q, qd, tau, dt, steps, every)
     return first, float(np.abs((first.high - second.high) + (first.low - second.low)).max())
 
 
 def trajectory(
-    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1, form: str = "composite",
-    order: int = ORDER,
+    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1,
+    form: str = "composite", order: int = ORDER,
 ) -> Path:  # fmt: skip
-    """The motion under constant torque at the times 0, every dt, 2 every dt ... up to steps dt, these products exact.
+    """The motion under constant torque at the exact times 0, every dt, 2 every dt ... up to steps dt.
 
-    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly, quaternions at length 1; dt: s, which
-    says no more than these times. form: of FORMS. Raises TooManySteps if a run would take too long, ValueError if its numbers
-    overflow.
+    q (nq,), qd, tau (nv,): rad, rad/s, N m, taken as what their doubles are exactly, quaternions at length 1;
+    dt: s, which says no more than these times. form: of FORMS. Raises TooManySteps if a run would take too
+    long, ValueError if its numbers overflow.
     """
     path, count, error = followed(tree, q, qd, tau, dt, steps, every, form, order)
     if error:
@@ -101,10 +97,11 @@ def trajectory(
 
 
 def followed(
-    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1, form: str = "composite",
-    order: int = ORDER, tolerance: float = TOLERANCE, most_operations: int | None = None,
+    tree: Tree, q: Numbers, qd: Numbers, tau: Numbers, dt: float, steps: int, every: int = 1,
+    form: str = "composite", order: int = ORDER, tolerance: float = TOLERANCE,
+    most_operations: int | None = None,
 ) -> tuple[np.ndarray, int, ValueError | None]:  # fmt: skip
-    """The records (k, 2, nq + nv) of a run as far as it goes, the number of its series, and why it ends early, or None."""
+    """The records (k, 2, nq + nv) of a run, the number of its series, and why it ends early, or None."""
     traced, n = equations(tree, tau, form), tree.coordinates.nq + tree.coordinates.nv
     high, low = traced.tables(n, order + 1)
     most = (most_operations or MOST_OPERATIONS) // (BESIDE + len(traced.code))
@@ -147,7 +144,7 @@ def equations(tree: Tree, tau: Numbers, form: str) -> Equations:
 
 
 def program(tape: Tape, inputs: Nodes, results: Nodes) -> tuple[Equations, dict[int, int]]:
-    """The operations that make results of inputs, which stand in the first rows; and the row of each node of the tape."""
+    """The operations from inputs, in the first rows, to results; and the row of each node of the tape."""
     order = tape.needed(results)
     constant = {i: tape.nodes[i][1][0] for i in order if tape.nodes[i][0] == "number"}
     row = {i: k for k, i in enumerate([*(x.i for x in inputs), *constant])}
@@ -174,7 +171,7 @@ def first_state(coordinates: Coordinates, q: Numbers, qd: Numbers) -> np.ndarray
 
 
 def step_size(high: np.ndarray, tolerance: float) -> float:
-    """With which the last two terms of every series are at most so large, in units of 1 + |value|: s; NaN if numbers overflow."""
+    """With which the last two terms of all series are within the tolerance: s; NaN if numbers overflow."""
     order = high.shape[1] - 1
     with np.errstate(all="ignore"):
         last = (np.abs(high[:, -2:]) / (1.0 + np.abs(high[:, :1]))).max(axis=0)
@@ -182,7 +179,6 @@ def step_size(high: np.ndarray, tolerance: float) -> float:
 
 
 def after(time: Fraction, high: np.ndarray, low: np.ndarray) -> np.ndarray:
-    """The state (2, nq + nv) a time in s after that of the series."""
     state, rounded = np.empty((2, len(high))), float(time)
     series.values_at(high, low, rounded, float(time - Fraction(rounded)), state)
     return state

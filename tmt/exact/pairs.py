@@ -1,4 +1,4 @@
-"""Numbers of about 32 digits for compiled code: the sum of a pair of doubles (high, low), low at most half an ulp of high.
+"""Numbers of some 32 digits: the sum of a pair of doubles (high, low), low at most half an ulp of high.
 
 Sums and products after Knuth and Dekker, exact where they must be by `fma`; over the values of compiled code.
 """
@@ -13,7 +13,6 @@ TERMS = 16  # of the series of sine and cosine up to pi/4: the next is below 1e-
 
 
 def pair(x: mpmath.mpf) -> tuple[float, float]:
-    """The pair that is nearest to a number of many digits."""
     high = float(x)
     return high, float(x - high)
 
@@ -25,7 +24,6 @@ with mpmath.workdps(80):
 
 
 def two_sum(a: Scalar, b: Scalar) -> Both:
-    """a + b and what it is rounded by."""
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
@@ -59,13 +57,11 @@ def divide(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar) -> Both:
 
 
 def less(ah: Scalar, al: Scalar, bh: Scalar, bl: Scalar, times: Scalar) -> Both:
-    """The pair a - times b."""
     ph, pl = multiply(bh, bl, times, 0.0)
     return add(ah, al, -ph, -pl)
 
 
 def root(ah: Value, al: Value) -> tuple[Value, Value]:
-    """The square root of a pair of compiled code: from that of the double on, by Newton's method; 0 where that is 0."""
     first = high = ah.function("sqrt")
     low = 0.0 * high
     for _ in range(2):
@@ -77,7 +73,7 @@ def root(ah: Value, al: Value) -> tuple[Value, Value]:
 
 
 def sincos(xh: Value, xl: Value) -> list[Value]:
-    """sin x and cos x of a pair of compiled code, x in rad: by their series, after turning x into [-pi/4, pi/4]."""
+    """sin x and cos x of a pair, x in rad, by their series after turning x into [-pi/4, pi/4]."""
     n = (xh / HIGH).function("rint")
     for part in QUARTER:
         p = n * part

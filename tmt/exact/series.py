@@ -1,9 +1,10 @@
-"""Taylor series of a motion in pairs of doubles (pairs.py), by rules for each operation: an interpreter, compiled once for all.
+"""Taylor series of a motion in pairs of doubles, by a rule for each operation: a compiled interpreter.
 
-Row r of `high` and `low` (rows, order + 1) has the coefficients of one number over time: x(t) = sum_k x_k t^k. The first rows are
-the state, numbers that are constant follow, then the results of the operations in `code`, rows of (operation, row of the
-result, rows of its operands). With c = a b, c_k is the sum of a_j b_(k-j); quotients, roots, sines and cosines have rules of
-this kind too (Jorba and Zou, Experimental Mathematics 14, 2005), from c b = a, c c = a, s' = c x', c' = -s x'.
+Row r of `high` and `low` (rows, order + 1) has the coefficients of one number over time: x(t) = sum_k x_k
+t^k. The first rows are the state, numbers that are constant follow, then the results of the operations in
+`code`, rows of (operation, row of the result, rows of its operands). With c = a b, c_k is the sum of a_j
+b_(k-j); quotients, roots, sines and cosines have rules of this kind too (Jorba and Zou, Experimental
+Mathematics 14, 2005), from c b = a, c c = a, s' = c x', c' = -s x'.
 """
 
 import ctypes
@@ -25,7 +26,8 @@ BACKWARD = list(reversed(range(BESIDE)))
 def expand(code: np.ndarray, high: np.ndarray, low: np.ndarray) -> None:
     """Write the coefficients of the state (its first are there) and of all that it is computed by.
 
-    code: (operations, 4); high, low: (rows, order + 1). The last operations make the state's next coefficients from their rates.
+    code: (operations, 4); high, low: (rows, order + 1). The last operations make the state's next
+    coefficients from their rates.
     """
     functions()["expand"](code.ctypes.data, len(code), high.shape[1], high.ctypes.data, low.ctypes.data)
 
@@ -59,9 +61,10 @@ def sincos_of_pair() -> Code:
 
 
 def convolution(code: Code, a: Value, b: Value, first: Value, last: Value) -> tuple[Value, Value]:
-    """sum of a_j b_(k-j) for j from first to last, as if in pairs (Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26, 2005).
+    """sum of a_j b_(k-j), j from first to last, as if in pairs (Ogita, Rump, Oishi, SIAM J. Sci. Comp. 2005).
 
-    a: where a_0 stands in the flat arrays, b: where b_k does. So many side by side; what is left, one after the other.
+    a: where a_0 stands in the flat arrays, b: where b_k does. So many side by side; what is left, one after
+    the other.
     """
     high, low, count, kind = code["high"], code["low"], last - first + 1, wide(DOUBLE, BESIDE)
     totals, errors = Variable(code, kind, 0.0), Variable(code, kind, 0.0)

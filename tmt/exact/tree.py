@@ -24,8 +24,8 @@ class ExactTree(Mechanism[Scalar]):
 def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> ExactTree:
     """A Tree with each number made by `number` from its double; directions have length 1 in all digits.
 
-    number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1 would not be
-    turns, and regrouped sums would differ from the literal ones by that.
+    number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1
+    would not be turns, and regrouped sums would differ from the literal ones by that.
     """
 
     def lifted(value: Scalar) -> Scalar:
@@ -51,7 +51,6 @@ def _unit(vector: Vector) -> Vector:
 
 
 def of_length_1(coordinates: Coordinates, q: Iterable[Scalar]) -> list[Scalar]:
-    """A position with each quaternion at length 1 in all digits."""
     position = list(q)
     for joint in coordinates.balls:
         position[joint.q] = normalized(position[joint.q])

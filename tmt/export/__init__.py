@@ -1,4 +1,4 @@
-"""The equations of a Tree as text in another language; see `tmt.equations`."""
+"""The equations of a Tree as text in another language."""
 
 import hashlib
 import keyword
@@ -8,6 +8,7 @@ from functools import lru_cache
 from textwrap import wrap
 from typing import Any
 
+from tmt.arm import ARM
 from tmt.compiled import forms
 from tmt.compiled.straight import Traced
 from tmt.derivation.mechanism import AnyTree
@@ -40,16 +41,50 @@ typedef typename union unsigned using virtual void volatile while main arrays si
 permute reshape assert error math numpy sympy"""
 CONVENTIONS = """\
 M(q) qdd + h(q, qd) = tau - D qd - k (q - rest) - P q - S qd, by the TMT method; Mbar is M, with armature.
-h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs of the joints,
+h: bias, MuJoCo's qfrc_bias: Coriolis, centrifugal and gravity terms. D: damping, k and rest: springs,
 P and S: gains of a linear controller. Numbers of the model that are no arguments are in the functions.
 T_b, B_b: Jacobians of the centre of mass of body b, inertial frame, and of its angular velocity, body axes.
 SI units, angles in rad. Shapes are those of one state; ... stands for any batch, where there is one."""
 
 
-def text(
-    model: Tree, language: str, quantities: Sequence[str], name: str, single: bool, head: Sequence[str],
-    words: Sequence[str] = (), limit: float = 60.0,
-) -> str:  # fmt: skip
+def equations(
+    model: Tree = ARM,
+    language: str = "c",
+    quantities: Sequence[str] = ("mass_matrix", "bias", "acceleration"),
+    *,
+    name: str = "robot",
+    single: bool = False,
+    head: Sequence[str] = ("Not checked.",),
+    parameters: Sequence[str] = (),
+    limit: float = 60.0,
+) -> str:
+    """The equations of a model, with its numbers, as text in another language, for use without this package.
+
+    Parameters
+    ----------
+    model : Tree, default ARM
+    language : {"c", "c header", "python", "matlab", "casadi", "jax", "latex", "html", "sympy"}
+        C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
+        states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
+        with a symbol for each parameter, for some six hinges and slides (needs SymPy).
+    quantities : functions of this package, by name; with symbols mass_matrix, bias, gravity_balance.
+        Of a step [A B], as "step_derivatives:rk4"; of a frame "frame_pose:hand", "frame_jacobian:hand" and
+        "frame_convective:hand".
+    name : of the file, which begins the names of C functions.
+    single : float in C.
+    head : lines that begin the comment at its head.
+    parameters : numbers that are further arguments of each function
+        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it;
+        "payload" and then a body's name: what that carries besides. They are in the frame that is the site of
+        the body's name, else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
+    limit : s
+        With symbols: the most work, counted as that of one processor core; ValueError beyond.
+
+    Examples
+    --------
+    >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
+    return out.reshape(*batch, 3)
+    """
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
     if not isinstance(language, str) or language not in known:
@@ -64,18 +99,18 @@ def text(
     if not isinstance(single, bool) or (single and language not in ("c", "c header")):
         expected = f"single precision is True or False, and in C only (not in {language})"
         raise ValueError(f"single is {shown(single)}; {expected}")
-    if not isinstance(words, list | tuple) or not all(isinstance(word, str) for word in words):
-        raise ValueError(f"parameters is {shown(words)}; a sequence of words is expected")
+    if not isinstance(parameters, list | tuple) or not all(isinstance(word, str) for word in parameters):
+        raise ValueError(f"parameters is {shown(parameters)}; a sequence of words is expected")
     limit = positive("limit", limit, "a number of seconds")
-    parameters = checked_parameters(model, language, chosen, words)
+    arguments = checked_parameters(model, language, chosen, parameters)
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
     if language in SYMBOLIC:
         return symbolic_text(model, language, chosen, lines, limit)
-    if parameters.values:
+    if arguments.values:
         lines += ["Parameters and their values in the model:"]
-        lines += [f"  {x}: {parameters.meanings[x]}: {list(value)}" for x, value in parameters.values.items()]
-    functions = [function_of(model, quantity, parameters) for quantity in dict.fromkeys(chosen)]
+        lines += [f"  {x}: {arguments.meanings[x]}: {list(value)}" for x, value in arguments.values.items()]
+    functions = [function_of(model, quantity, arguments) for quantity in dict.fromkeys(chosen)]
     return LANGUAGES[language](Program(name, lines, functions, single))
 
 
@@ -130,7 +165,6 @@ def conventions(model: Tree) -> list[str]:
 
 
 def places(part: slice) -> str:
-    """The first and the last number of a part of q or qd."""
     return f"{part.start}" if part.stop == part.start + 1 else f"{part.start}-{part.stop - 1}"
 
 

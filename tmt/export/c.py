@@ -8,7 +8,7 @@ from tmt.compiled.straight import places_handed_on
 
 from .statements import Function, Line, Program, Syntax, statements
 
-# assignments of one function, up to some 3,000 operations: the time of a compiler grows with the square of their number
+# assignments of one function: the time of a compiler grows with the square of their number
 LONGEST = 1_000
 NAME = re.compile(r"\b[xsc]\d+\b")  # of a value
 NOT_INLINED = "#ifdef __GNUC__\n__attribute__((noinline))\n#endif"
@@ -58,7 +58,6 @@ def arguments(program: Program, function: Function) -> str:
 
 
 def definitions(program: Program, function: Function) -> list[str]:
-    """A function; before a long one its parts, which hand values on in an array w."""
     number = kind(program.single)
     syntax = Syntax(
         input="{x}[{k}]",

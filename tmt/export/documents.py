@@ -1,4 +1,4 @@
-"""Symbolic equations as a LaTeX document, and as an HTML page with MathML; the formulas are written by SymPy's printers."""
+"""Symbolic equations as a LaTeX document and as an HTML page with MathML, formulas by SymPy's printers."""
 
 import html
 import re
@@ -43,12 +43,13 @@ HTML = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>Equations of motion</title>
 <style>
 body {{ font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; }}
-td {{ padding: 0 1rem 0 0; }} td.value {{ text-align: right; }} h2 {{ font-size: 1.1rem; margin-top: 1.5rem; }}
+td {{ padding: 0 1rem 0 0; }} h2 {{ font-size: 1.1rem; margin-top: 1.5rem; }} math {{ font-size: 1.05em; }}
 .entry {{ padding-left: 2rem; text-indent: -2rem; margin: .5rem 0; line-height: 1.9; }}
-pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; }} math {{ font-size: 1.05em; }}
+pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; }}
 </style></head><body>
 <h1>Equations of motion</h1>
-<p><i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) = <i>τ − D q̇ − K</i> (<i>q − q</i><sub>0</sub>)</p>
+<p><i>M</i>(<i>q</i>) <i>q̈</i> + <i>h</i>(<i>q</i>, <i>q̇</i>) =
+<i>τ − D q̇ − K</i> (<i>q − q</i><sub>0</sub>)</p>
 <p>{text}</p>
 {tables}
 {equations}
@@ -58,8 +59,6 @@ pre {{ font-size: .75rem; color: #555; white-space: pre-wrap; margin-top: 3rem; 
 
 
 class Section(NamedTuple):
-    """A quantity: its symbol, what it is, and its entries."""
-
     letter: str
     title: str
     rows: list[list[Expression]]
@@ -70,7 +69,6 @@ class Section(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether it is short enough to be shown as a matrix."""
         columns = list(zip(*self.rows))
         widths = [max(len(re.sub("_[a-z]*", "_", str(entry))) for entry in column) for column in columns]
         return len(columns) > 1 and sum(widths) + 4 * len(columns) <= WIDTH
@@ -93,16 +91,11 @@ def sections(symbolic: Symbolic) -> list[Section]:
         rows = matrix.tolist()
         if name == "bias" and "gravity_balance" in symbolic.entries:
             gravity = symbolic.entries["gravity_balance"]
-            rows = [
-                [h - G + symbol if G else h] for (h,), G, symbol in zip(rows, gravity, of_gravity(gravity))
-            ]
+            symbols = [sympy.Symbol(f"G_{{{i + 1}}}") for i in range(len(rows))]
+            rows = [[h - G + symbol if G else h] for (h,), G, symbol in zip(rows, gravity, symbols)]
         rows = [[entry.xreplace(rounded(entry)) for entry in row] for row in rows]
         result.append(Section(*TITLES[name], rows))
     return result
-
-
-def of_gravity(entries: Sequence[Expression]) -> list[Expression]:
-    return [sympy.Symbol(f"G_{{{i + 1}}}") for i in range(len(entries))]
 
 
 def rounded(expression: Expression) -> dict[Expression, Expression]:
@@ -127,7 +120,6 @@ def introduction(symbolic: Symbolic) -> str:
 
 
 def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """A LaTeX document (article, amsmath): head_lines as comments, symbols, parameters, each quantity."""
     equations, display = [], symbolic.display
     for section in sections(symbolic):
         equations.append(rf"\medskip\textbf{{{escaped(section.heading)}}}")
@@ -147,10 +139,8 @@ def latex(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
 
 
 def in_latex(expression: Expression, display: Display) -> str:
-    """A formula in which a line may break, within brackets too."""
-    text: str = sympy.latex(
-        expression, symbol_names=dict(display), fold_func_brackets=True, long_frac_ratio=2
-    )
+    options = {"symbol_names": dict(display), "fold_func_brackets": True, "long_frac_ratio": 2}
+    text: str = sympy.latex(expression, **options)
     return re.sub(r"\\(left|right)(?=[()])", "", text)
 
 
@@ -161,7 +151,6 @@ def escaped(text: str) -> str:
 
 
 def tabular(rows: Sequence[Sequence[str]]) -> str:
-    """A table of a symbol and texts; of four columns the second are numbers."""
     cells = [[f"${symbol}$", *map(escaped, texts)] for symbol, *texts in rows]
     body = " \\\\\n".join(map(" & ".join, cells))
     columns = "lrll" if len(cells[0]) == 4 else "ll"
@@ -169,7 +158,6 @@ def tabular(rows: Sequence[Sequence[str]]) -> str:
 
 
 def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
-    """An HTML page with MathML that needs no network: what `latex` shows."""
     equations, printer = [], Printer(symbolic.display)
     for section in sections(symbolic):
         equations.append(f"<h2>{html.escape(section.heading)}</h2>")
@@ -191,8 +179,6 @@ def page(symbolic: Symbolic, head_lines: Sequence[str] = ()) -> str:
 
 
 class Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no types
-    """MathML with the symbols of the documents."""
-
     def __init__(self, display: Display):
         super().__init__()
         self.display = display
@@ -206,7 +192,6 @@ class Printer(MathMLPresentationPrinter):  # type: ignore[misc]  # SymPy has no 
         return text.replace("<mfenced>", "<mrow><mo>(</mo>").replace("</mfenced>", "<mo>)</mo></mrow>")
 
     def in_lines(self, expression: Expression) -> str:
-        """A sum in pieces between which a line may be broken."""
         pieces = ""
         for term in expression.as_ordered_terms():
             minus = term.could_extract_minus_sign()

@@ -1,8 +1,7 @@
 """Functions of JAX, which take any batch of states; they can be jitted, mapped and differentiated.
 
-A function is a table of operations, level by level: those of a kind whose operands are known are one
-operation on rows of an array. As single statements, which XLA copies into each other, those of a robot of
-seven joints took minutes to run.
+A function is a table of operations, level by level: those of a kind whose operands are known are one on rows
+of an array. Single statements, which XLA copies into each other, took minutes for a robot of seven joints.
 """
 
 from collections import defaultdict
@@ -10,11 +9,12 @@ from textwrap import fill
 
 from tmt.compiled.straight import Traced
 
-from .scripts import docstring
+from .scripts import defined, docstring
 from .statements import Function, Program
 
 NAMES = {
-    "+": "add", "-": "subtract", "*": "multiply", "/": "divide", "neg": "negative", "sqrt": "sqrt", "arctan": "arctan",
+    "+": "add", "-": "subtract", "*": "multiply", "/": "divide", "neg": "negative", "sqrt": "sqrt",
+    "arctan": "arctan",
 }  # fmt: skip
 NOTE = "Numbers are float32 unless JAX is set to 64 bits: jax.config.update('jax_enable_x64', True)."
 HEAD = '''
@@ -48,7 +48,7 @@ def evaluated(table, numbers, places, shape, sizes, *states):
 
 
 def source(program: Program) -> str:
-    texts = "".join(f"\n\n{text(function)}\n" for function in program.functions)
+    texts = "".join(f"\n\n{text(function)}" for function in program.functions)
     return docstring([*program.head, "", NOTE]) + HEAD + texts
 
 
@@ -71,21 +71,14 @@ def text(function: Function) -> str:
     places = [[row[i] for i in outputs[k : k + size]] for k in range(0, len(outputs), size)]
     numbers, takes = [float(nodes[i][1][0]) for i in constants], ", ".join(function.takes)
     sizes, upper = [function.sizes[name] for name in function.takes], function.name.upper()
-    return "\n".join(
-        [
-            f"{upper} = (",
-            *(filled(f"{entry!r},") for entry in table),
-            filled(")"),
-            filled(f"{upper}_NUMBERS = {numbers!r}"),
-            filled(f"{upper}_PLACES = {places!r}"),
-            "",
-            "",
-            f"def {function.name}({takes}):",
-            f'    """{function.title}"""',
-            f"    table = {upper}, {upper}_NUMBERS, {upper}_PLACES, {function.shape}, {sizes}",
-            f"    return evaluated(*table, {takes})",
-        ]
-    )
+    data = [f"{upper} = (", *(f"{entry!r}," for entry in table), ")"]
+    data += [f"{upper}_NUMBERS = {numbers!r}", f"{upper}_PLACES = {places!r}"]
+    lines = [
+        f'"""{function.title}"""',
+        f"table = {upper}, {upper}_NUMBERS, {upper}_PLACES, {function.shape}, {sizes}",
+        f"return evaluated(*table, {takes})",
+    ]
+    return "\n".join(map(filled, data)) + defined(f"def {function.name}({takes}):", lines)
 
 
 def filled(line: str) -> str:
@@ -93,7 +86,6 @@ def filled(line: str) -> str:
 
 
 def by_level(traced: Traced) -> list[tuple[str, list[int]]]:
-    """The operations, of one kind at a time, each after its operands."""
     tape, level = traced.tape, defaultdict[int, int](int)
     groups = defaultdict[tuple[int, str], list[int]](list)
     for i in traced.nodes:

@@ -15,8 +15,8 @@ from tmt.model.tree import Tree
 from .trigonometry import Expression
 
 GREEK = frozenset((
-    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho", "sigma", "tau", "phi",
-    "chi", "psi", "omega",
+    "alpha", "beta", "gamma", "delta", "epsilon", "zeta", "eta", "theta", "kappa", "mu", "nu", "xi", "rho",
+    "sigma", "tau", "phi", "chi", "psi", "omega",
 ))  # fmt: skip
 Symbols = list[Expression]
 AXES = "xyz"
@@ -62,7 +62,6 @@ class Names:
             self.armature.append(self.symbol(rotor, f"J_{joint}", f"J_{{{i + 1}}}", unit, meaning))
 
     def add_joints(self, names: Sequence[str]) -> None:
-        """Symbols of positions and speeds: Greek letters if all joints are called so."""
         greek = GREEK.issuperset(self.source.joint_names)
         self.q = [sympy.Symbol(name if greek else f"q_{name}") for name in names]
         self.qd = [sympy.Symbol(f"{name}dot" if greek else f"qd_{name}") for name in names]
@@ -126,7 +125,6 @@ class Names:
 
     @property
     def is_exact(self) -> bool:
-        """Whether all numbers that have no names are integers."""
         return self.named and all(x in (-1, 0, 1) for axis in self.axes for x in axis)
 
     def mechanism(self, scalar: Callable[[Expression], Scalar]) -> AnyTree:
@@ -142,7 +140,6 @@ class Names:
 
 
 def identifiers(names: Iterable[str]) -> list[str]:
-    """The names as parts of identifiers in ASCII, each different."""
     result: list[str] = []
     for name in names:
         plain = re.sub(r"\W", "_", name, flags=re.ASCII)
@@ -168,7 +165,6 @@ def number(value: float) -> Expression:
 
 
 def unit(axis: Iterable[Expression]) -> list[Expression]:
-    """A direction of length 1 in more digits than a double has."""
     return list(sympy.Matrix([sympy.Rational(x) for x in axis]).normalized().evalf(DIGITS))
 
 

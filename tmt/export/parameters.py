@@ -31,9 +31,10 @@ class Frame(NamedTuple):
 class Parameters:
     """The arguments that stand for chosen numbers of a Tree.
 
-    words: "gravity"; a body, or BODY.mass, BODY.com, BODY.inertia; "payload" and a body: what that carries besides. They are in
-    the frame that is the site of the body's name, else in that of its joint. values: by the names of the arguments, those of the
-    Tree. meanings: of each. ValueError for a word that is none of these.
+    words: "gravity"; a body, or BODY.mass, BODY.com, BODY.inertia; "payload" and a body: what that carries
+    besides. They are in the frame that is the site of the body's name, else in that of its joint. values: by
+    the names of the arguments, those of the Tree. meanings: of each. ValueError for a word that is none of
+    these.
     """
 
     def __init__(self, tree: Tree, words: Sequence[str]):
@@ -84,7 +85,6 @@ class Parameters:
             self.add(argument, numbers[part], MEANINGS[part].format(name))
 
     def add_payload(self, tree: Tree, carrier: str) -> None:
-        """One more body, which has no mass in the Tree."""
         self.has_payload = True
         self.carriers.append(tree.body_names.index(carrier))
         for part, size in SIZES.items():
@@ -97,7 +97,6 @@ class Parameters:
         return Frame(np.array(origin, dtype=float), np.array(axes, dtype=float))
 
     def applied(self, tree: Tree, values: Mapping[str, Values]) -> AnyTree:
-        """The Tree with these numbers, of any type, in place of its own."""
         numbers: dict[str, Any] = {field.name: getattr(tree, field.name) for field in fields(Mechanism)}
         bodies = {part: list(numbers[part]) for part in SIZES}
         if self.has_payload:

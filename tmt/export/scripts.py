@@ -4,15 +4,10 @@ from collections.abc import Iterable, Sequence
 
 from .statements import Function, Program, Syntax, statements
 
-PYTHON = Syntax(
-    input="{x}{k}", assignment="{name} = {value}", result="{x}[..., {k}] = {value}", function="np.{}", arctan="arctan"
-)  # fmt: skip
-CASADI = Syntax(
-    input="{x}[{k}]", assignment="{name} = {value}", result="{x}[{k}] = {value}", function="casadi.{}"
-)
-MATLAB = Syntax(
-    input="{x}({n}, :)", assignment="{name} = {value};", result="{x}({n}, :) = {value};", times=".*", over="./"
-)  # fmt: skip
+NAMED = "{name} = {value}"
+PYTHON = Syntax("{x}{k}", NAMED, "{x}[..., {k}] = {value}", function="np.{}", arctan="arctan")
+CASADI = Syntax("{x}[{k}]", NAMED, "{x}[{k}] = {value}", function="casadi.{}")
+MATLAB = Syntax("{x}({n}, :)", f"{NAMED};", "{x}({n}, :) = {value};", times=".*", over="./")
 HEAD = '''import numpy as np
 
 NQ, NV = {nq}, {nv}
@@ -26,14 +21,10 @@ def arrays(sizes, *states):
             raise ValueError(f"shape {{x.shape}}; expected (..., {{size}})")
     return *states, np.broadcast_shapes(*(x.shape[:-1] for x in states))
 '''
-NOTE = (
-    "Each is a casadi.Function of columns; "
-    "of a result of three dimensions the matrices are one below the other."
-)
-COLUMNS = (
-    "States are columns: q (nq, N), qd and tau (nv, N); what is the same for all may be one column. "
-    "The last dimension of each result is that of the states."
-)
+NOTE = "Each is a casadi.Function of columns; of three dimensions the matrices are one below the other."
+COLUMNS = """\
+States are columns: q (nq, N), qd and tau (nv, N); what is the same for all may be one column.
+The last dimension of each result is that of the states."""
 
 
 def docstring(lines: Sequence[str]) -> str:
@@ -89,7 +80,7 @@ def casadi_function(function: Function) -> str:
 
 def matlab(program: Program) -> str:
     lines = [f"function varargout = {program.name}(quantity, varargin)"]
-    lines += [f"% {line}".rstrip() for line in [*program.head, "", COLUMNS]]
+    lines += [f"% {line}".rstrip() for line in [*program.head, "", *COLUMNS.splitlines()]]
     cases = []
     for function in program.functions:
         call = f"{program.name}('{function.name}', {', '.join(function.takes)})"

@@ -31,7 +31,6 @@ class Forms:
         self.known: dict[Polynomial, Expression] = {}
 
     def shortest(self, poly: Polynomial) -> Expression:
-        """The shortest expression that is found for a polynomial in symbols, sines and cosines."""
         count, terms, products = len(self.symbols), [], set()
         parts: dict[tuple[int, ...], Polynomial] = defaultdict(lambda: self.ring.functions.zero)
         for monomial, number in poly.items():
@@ -67,7 +66,6 @@ class Forms:
         yield TR8(self.expression(poly).expand()).expand()  # products of sines and cosines as sums
 
     def expressions(self, poly: Polynomial) -> Iterator[Expression]:
-        """A polynomial with its common factors taken out, and as a product of polynomials."""
         yield self.expression(poly)
         if self.ring.exact and len(poly) <= FEW_FACTORED:
             number, factors = poly.factor_list()
@@ -92,12 +90,10 @@ class Forms:
 
 
 def cost(form: Expression) -> int:
-    """The number of operations in an expression; a minus in front of a product is free."""
     return form.count_ops() - bool(form.as_coeff_Mul()[0].is_negative)
 
 
 def term(number: Expression, form: Expression, symbols: Mapping[Expression, Expression]) -> Term:
-    """A term of a sum, of a number, an expression and further factors."""
     factors = dict(symbols)
     for factor in Mul.make_args(form):
         if factor.is_number:

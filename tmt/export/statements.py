@@ -32,7 +32,6 @@ class Function(NamedTuple):
 
     @property
     def used(self) -> list[tuple[str, int]]:
-        """Those of the inputs on which a result depends."""
         nodes = set(self.traced.nodes)
         return [place for place, x in zip(self.inputs, self.traced.inputs) if x.i in nodes]
 
@@ -59,14 +58,11 @@ class Syntax:
 
 
 class Line(NamedTuple):
-    """An assignment; name: of the value, "" for a number of a result."""
-
     text: str
     name: str = ""
 
 
 def statements(function: Function, syntax: Syntax) -> list[Line]:
-    """The assignments of a function, those of its results where they are known."""
     inputs = [syntax.input.format(x=x, k=k, n=k + 1) for x, k in function.inputs]
     places = [divmod(number, function.size) for number in range(len(function.traced.outputs))]
     results = [syntax.result.format(x=function.results[x], k=k, n=k + 1, value="{value}") for x, k in places]
@@ -74,8 +70,6 @@ def statements(function: Function, syntax: Syntax) -> list[Line]:
 
 
 class Writer:
-    """The assignments of a traced function and of its results, formats of their {value}, from its inputs."""
-
     def __init__(self, traced: Traced, inputs: Sequence[str], results: Sequence[str], syntax: Syntax):
         self.tape, self.syntax = traced.tape, syntax
         self.traced, self.results = traced, results
@@ -104,12 +98,10 @@ class Writer:
             yield Line(self.results[place].format(value=self.text(i)))
 
     def assigned(self, i: int, name: str, value: str) -> Line:
-        """The assignment of a node to a name, which stands for it from then on."""
         self.known[i] = name, ATOM
         return Line(self.syntax.assignment.format(name=name, value=value), name)
 
     def text(self, i: int, least: int = SUM) -> str:
-        """The expression of a node, in brackets where it is bound less than `least`."""
         text, bound = self.known[i]
         return text if bound >= least else f"({text})"
 

@@ -49,8 +49,8 @@ def symbolic(
 ) -> Symbolic:
     """Mbar, h and the torque that balances gravity of a Tree of hinges and slides, simplified.
 
-    limit: the work that it may take, s of a processor core of 2026, counted and not measured; where half of it
-    does not do with named parameters, they are numbers. Raises ValueError for a ball, and where it takes
+    limit: the work that it may take, s of a processor core of 2026, counted and not measured; where half of
+    it does not do with named parameters, they are numbers. Raises ValueError for a ball, and where it takes
     more.
     """
     for name, kind in zip(tree.joint_names, tree.kind):
@@ -66,7 +66,6 @@ def symbolic(
 
 
 def derived(names: Names, quantities: Sequence[str], limit: float, note: str) -> Symbolic:
-    """The equations with the parameters that `names` has; TooLong beyond the limit."""
     tree = names.source
     places = {i: sympy.Dummy() for i, kind in enumerate(tree.kind) if kind == "slide"}
     hinges = [i for i, kind in enumerate(tree.kind) if kind == "hinge"]
@@ -106,7 +105,6 @@ def derived(names: Names, quantities: Sequence[str], limit: float, note: str) ->
 
 
 def symmetric(M: Rows, expression: Callable[[Scalar], Expression]) -> Expression:
-    """A symmetric Matrix of the expressions of the entries on and above its diagonal."""
     n = range(len(M))
     upper = {(i, j): expression(M[i][j]) for i in n for j in n if i <= j}
     return sympy.Matrix([[upper[min(i, j), max(i, j)] for j in n] for i in n])

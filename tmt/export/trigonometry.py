@@ -12,10 +12,8 @@ from tmt.derivation.vectors import Scalar, Vector, cos, sin
 PRECISION = 120
 NOISE = 1e-25  # of the largest coefficient of a polynomial
 LARGEST_PRODUCT = 3_000_000  # pairs of terms in one product: some seconds
-# work, s of a processor core of 2026: of a product, of each of its pairs of terms, of a term whose form is sought
+# work, s of a core of 2026: of a product, of each of its pairs of terms, of a term whose form is sought
 OF_PRODUCT, OF_PAIR, OF_TERM = 4e-4, 4e-6, 1e-3
-
-
 Polynomial = Any  # of SymPy
 Expression = Any  # of SymPy
 
@@ -27,7 +25,8 @@ class TooLong(Exception):
 class Ring:
     """Polynomials in symbols, sines and cosines of n angles; exact: rational coefficients.
 
-    Work is counted, so that the same is done on every machine under any load: TooLong where it is more than the limit, s.
+    Work is counted, so that the same is done on every machine under any load: TooLong where it is more than
+    the limit, s.
     """
 
     def __init__(self, symbols: Sequence[Expression], n: int, exact: bool, limit: float):
@@ -45,7 +44,6 @@ class Ring:
             raise TooLong
 
     def scalar(self, value: Expression) -> "Trig":
-        """A number, or an expression in the symbols."""
         return Trig(self, self.ring.from_expr(value) if hasattr(value, "free_symbols") else self.ring(value))
 
     def angle(self, i: int) -> "Angle":
@@ -66,15 +64,12 @@ class Ring:
         return poly if self.exact else self.without_noise(poly, NOISE)
 
     def without_noise(self, poly: Polynomial, noise: float) -> Polynomial:
-        """The polynomial without coefficients of at most `noise` times the largest."""
         least = noise * max(map(abs, poly.values()), default=0)
         left = {monomial: number for monomial, number in poly.items() if abs(number) > least}
         return poly.ring.from_dict(left)
 
 
 class Trig:
-    """A reduced polynomial of a Ring."""
-
     __slots__ = ("poly", "ring")
 
     def __init__(self, ring: Ring, poly: Polynomial):
@@ -108,7 +103,6 @@ class Trig:
     __radd__, __rmul__ = __add__, __mul__
 
     def derivative(self, variable: "Angle | Trig") -> "Trig":
-        """By an Angle, or by a Trig that is a symbol."""
         if isinstance(variable, Angle):
             s, c = variable.sine.poly, variable.cosine.poly
             return self.new(self.ring.reduced(self.poly.diff(s) * c - self.poly.diff(c) * s, self.ring.pairs))
@@ -116,8 +110,6 @@ class Trig:
 
 
 class Angle:
-    """The angle of a hinge from its reference: its sine and cosine."""
-
     def __init__(self, sine: Trig, cosine: Trig):
         self.sine, self.cosine = sine, cosine
 

@@ -1,7 +1,7 @@
 """Derivatives of a step: of the slope by those of the linear system that gives it.
 
-A slope a solves residual(a, x) = 0, which is linear in a; so da/dx = -A^-1 dresidual/dx at fixed a, with A = dresidual/da. Then
-dual numbers need not go through the solution, nor through derivatives of derivatives.
+A slope a solves residual(a, x) = 0, which is linear in a; so da/dx = -A^-1 dresidual/dx at fixed a, with A =
+dresidual/da. Then dual numbers need not go through the solution, nor through derivatives of derivatives.
 """
 
 from collections.abc import Callable
@@ -13,9 +13,20 @@ import numpy as np
 from tmt.derivation import composite, linearized
 from tmt.derivation.dual import Dual, seeded
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.quantities import Form, State, added
-from tmt.derivation.vectors import Factors, Rows, Scalar, Values, is_zero, solve_any, total
-from tmt.methods.stepping import LITERAL, Dynamics, Held, Implicit, Method, minus, plus, stepped
+from tmt.derivation.quantities import Form, State
+from tmt.derivation.vectors import (
+    Factors,
+    Rows,
+    Scalar,
+    Values,
+    added,
+    is_zero,
+    minus,
+    plus,
+    solve_any,
+    total,
+)
+from tmt.methods.stepping import LITERAL, Dynamics, Held, Implicit, Method, stepped
 from tmt.methods.stepping import State as Reached
 
 Array = np.ndarray
@@ -25,8 +36,6 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 
 class Change(NamedTuple):
-    """Accelerations at a state and torque, and what changes them: matrix da = dtau - by_movement dq - by_speed dqd."""
-
     a: Values
     by_movement: Rows
     by_speed: Rows
@@ -35,7 +44,7 @@ class Change(NamedTuple):
 
 
 class Linearized(Dynamics):
-    """Accelerations of dual numbers over any scalar, with the derivatives of the linear system by those of Mbar qdd + h."""
+    """Accelerations of dual numbers over any scalar, by the derivatives of the linear system."""
 
     def __init__(self, form: Form = COMPOSITE):
         super().__init__(form.terms)
@@ -82,7 +91,7 @@ class Linearized(Dynamics):
     def changes_of_bias(
         self, tree: AnyTree, q: Values, qd: Values, a: Values, implicit: Implicit
     ) -> list[Rows]:
-        """dt dh/dqd in the rows that are implicit, and the derivatives of dt dh/dqd a by movements and by speeds."""
+        """dt dh/dqd in the implicit rows, and the derivatives of dt dh/dqd a by movements and by speeds."""
         rest, half = [0.0] * len(qd), [0.5] * len(qd)
         ahead, behind = (
             State(tree, {"q": q, "qd": speeds, "qdd": rest}, self.form).force_rates
@@ -104,11 +113,11 @@ def one_step(
 def amplification(
     stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: float | Array
 ) -> Array:
-    """The exact Jacobian of one step of a method, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
+    """The exact Jacobian of one step, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
 
-    q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or (...). At an
-    equilibrium it is what a step does to a small deviation: its eigenvalues are the growth of each mode per step. By dual
-    numbers, all directions at once; so it holds for partitioned and implicit methods too.
+    q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or
+    (...). At an equilibrium its eigenvalues are the growth of each mode per step. By dual numbers, all
+    directions at once; so it holds for partitioned and implicit methods too.
     """
     return transition(stepping, tree, q, qd, np.array(tau, float), dt, by_torque=False)
 
@@ -117,7 +126,7 @@ def transition(
     stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: float | Array,
     by_torque: bool = True,
 ) -> Array:  # fmt: skip
-    """The same by q, qd and then tau (..., nv), each a column: (..., 2 nv, 3 nv) or, not by_torque, (..., 2 nv, 2 nv)."""
+    """The same by q, qd and tau (..., nv): (..., 2 nv, 3 nv) or, not by_torque, (..., 2 nv, 2 nv)."""
     nv = tree.coordinates.nv
     width = (2 + by_torque) * nv
     batch = np.broadcast_shapes(*(np.shape(x)[:-1] for x in (q, qd, tau)), np.shape(dt))
@@ -136,7 +145,7 @@ def transition(
 def jacobian_of_part(
     stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: Array, width: int
 ) -> Array:
-    """The same of a few states: q (states, nq), qd and tau (states, nv), dt (states,); width: how many columns."""
+    """The same of a few states: q (states, nq), qd, tau (states, nv), dt (states,); width: of columns."""
     joints, nv, nq = tree.coordinates, qd.shape[1], q.shape[1]
     start = [*q.T.copy(), *qd.T.copy(), *tau.T.copy()]
     directions = np.eye(width)[..., None]  # component, direction, state

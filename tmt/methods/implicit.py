@@ -1,14 +1,14 @@
 """Implicit Runge-Kutta methods: their stages solve an equation, by Newton's method with exact Jacobians.
 
-The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at
-q_i = q + dt c_i qd + dt^2 sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. A ball's quaternions p_i follow from the
-speeds of the stages by linear equations, p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
+The unknowns are the accelerations a_i of the stages, a_i = qdd(q_i, qd_i), at q_i = q + dt c_i qd + dt^2
+sum_j (A A)_ij a_j and qd_i = qd + dt sum_j A_ij a_j. A ball's quaternions p_i follow from the speeds of the
+stages by linear equations, p_i = p + dt sum_j A_ij p_j o (0, omega_j) / 2.
 
-A large step has several solutions. Newton's method starts from that of the equations made linear at (q, qd), and finds
-the one nearby.
+A large step has several solutions. Newton's method starts from that of the equations made linear at (q, qd),
+and finds the one nearby.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from itertools import chain
@@ -17,11 +17,11 @@ import numpy as np
 
 from tmt.derivation.coordinates import FLAT, Flat, Joint, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
-from tmt.derivation.vectors import Scalar, Values, solve_any
+from tmt.derivation.vectors import Scalar, Values, minus, plus, solve_any, weighted
 from tmt.methods.stepping import Joints, Numbers, Slope, State, Tableau
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not found
-CLOSE = 1e-10  # change of the accelerations, relative to 1 rad/s2 + their size: the next change would be its square
+CLOSE = 1e-10  # change of the accelerations, of 1 rad/s2 + their size: the next would be its square
 
 
 @dataclass(frozen=True)
@@ -43,19 +43,19 @@ class ImplicitRungeKutta(Tableau):
 
         def linear(q_i: Values, qd_i: Values) -> Values:
             """The slope as it would be if it were linear, as at (q, qd)."""
-            x = seeded([*q, *qd], [new - old for old, new in zip((*q, *qd), (*q_i, *qd_i))])
+            x = seeded([*q, *qd], minus([*q_i, *qd_i], [*q, *qd]))
             return [sum(x[0].parts(f)) for f in slope(x[: len(q)], x[len(q) :])]
 
         def left_over(slope: Slope, a: Values) -> Values:
             slopes = [slope(*state) for state in self.stage_states(q, qd, dt, a, joints)]
-            return [f - x for f, x in zip(chain(*slopes), a)]
+            return minus(list(chain(*slopes)), a)
 
         a, last = [0.0] * (len(qd) * self.stages), False
         for is_linear in (True, *[False] * ITERATIONS):
             function = partial(left_over, linear if is_linear else slope)
             matrix = [[x * -1.0 for x in row] for row in jacobian(function, a)]
             change = solve_any(matrix, function(a))
-            a = [old + new for old, new in zip(a, change)]
+            a = plus(a, change)
             if last:  # once more after the values are found: only then are their derivatives exact
                 return self.finish(q, qd, dt, a, joints)
             last = not is_linear and largest(change) <= CLOSE * (1.0 + largest(a))
@@ -100,20 +100,14 @@ class ImplicitRungeKutta(Tableau):
 def placed(joints: Joints, q: Values, moved: Values, balls: list[Values]) -> Values:
     """The position after a movement from q, (nv,), of all but the balls, and these quaternions."""
     if isinstance(joints, Flat) or not balls:
-        return [x + y for x, y in zip(q, moved)]
+        return plus(q, moved)
     turned, result = iter(balls), []
     for joint in joints.joints:
         result += next(turned) if joint.kind == "ball" else [q[joint.q.start] + moved[joint.qd.start]]
     return result
 
 
-def weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
-    terms = [w * v for w, v in zip(weights, values)]
-    return sum(terms[1:], terms[0])
-
-
 def largest(values: Values) -> float:
-    """The largest absolute value; of dual numbers that of their values."""
 
     def plain(value: Scalar) -> Scalar:
         return plain(value.value) if isinstance(value, Dual) else np.max(np.abs(value))

@@ -8,7 +8,7 @@ from typing import TypeVar
 from tmt.derivation.coordinates import FLAT
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import with_diagonal
-from tmt.derivation.vectors import Scalar, Values
+from tmt.derivation.vectors import Scalar, Values, weighted
 
 from .stepping import LITERAL, Dynamics, Implicit, Joints, Method, Slope, State, advance, increments
 
@@ -20,13 +20,14 @@ Gains = Sequence[Sequence[float]]
 class SemiImplicitEuler(Method):
     """qd+ = qd + dt a, then q+ = q moved by dt qd+, with a from the linear system
 
-        (Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 (k + P)]) a = tau - D qd - k (q - rest) - P q - S qd - h [- dt (k + P) qd].
+        (Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 (k + P)]) a = Qbar [- dt (k + P) qd].
 
-    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `lone_bodies`, which have no
-    other body on them or under them; `implicit_gains`: so is a controller's S, in the entries whose two joints lie on one path
-    to the world; `implicit_springs`: so are springs, and all entries of S and P. What MuJoCo calls Euler (none of these),
-    implicit (bias, gains), implicitfast (lone bodies, gains) and discrete (lone bodies, springs, gains). MuJoCo documentation,
-    numerical integration; which gains are implicit was measured.
+    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `lone_bodies`,
+    which have no other body on them or under them; `implicit_gains`: so is a controller's S, in the entries
+    whose two joints lie on one path to the world; `implicit_springs`: so are springs, and all entries of S
+    and P. What MuJoCo calls Euler (none of these), implicit (bias, gains), implicitfast (lone bodies, gains)
+    and discrete (lone bodies, springs, gains). MuJoCo documentation, numerical integration; which gains are
+    implicit was measured.
     """
 
     implicit_bias: bool
@@ -35,7 +36,7 @@ class SemiImplicitEuler(Method):
     implicit_gains: bool = False
 
     def gains_held(self, tree: AnyTree) -> tuple[Gains, Gains]:
-        """The implicit entries of a controller's gains, of position and of speed: (nv, nv) each, () where there are none."""
+        """The implicit entries of the gains of position and of speed, (nv, nv) each; () for none."""
         if self.implicit_springs:
             return (tree.position_gain, tree.speed_gain)
         if not (self.implicit_gains and tree.speed_gain):
@@ -44,7 +45,6 @@ class SemiImplicitEuler(Method):
         return (), tuple([gain if is_on else 0.0 for gain, is_on in zip(*rows)] for rows in connected)
 
     def held(self, tree: AnyTree) -> tuple[Gains, Gains]:
-        """All that acts implicitly, as stiffness and as damping, (nv, nv) each."""
         n = len(tree.axis)
         has_stiffness = self.implicit_springs and tree.has_springs
         stiffness = by_speed(tree, tree.stiffness) if has_stiffness else [0.0] * n
@@ -52,7 +52,6 @@ class SemiImplicitEuler(Method):
         return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
     def implicit(self, tree: AnyTree, qd: Values, dt: Scalar) -> Implicit:
-        """What the linear system above has beside Mbar and Qbar."""
         (stiff, damped), powers, moved = self.held(tree), (dt, dt * dt), [dt * v for v in qd]
         matrix = [[weighted(entry, powers) for entry in zip(*rows)] for rows in zip(damped, stiff)]
         pull = [weighted(row, moved) for row in stiff]
@@ -70,19 +69,12 @@ class SemiImplicitEuler(Method):
 
 
 def by_speed(tree: AnyTree, of_joints: Iterable[T]) -> list[T]:
-    """For each speed the value of its joint."""
     pairs = zip(of_joints, tree.coordinates.joints)
     return [value for value, joint in pairs for _ in joint.speeds]
 
 
-def weighted(row: Sequence[float], values: Sequence[Scalar]) -> Scalar:
-    """The sum of the entries of a row times values; 0.0 where all are zero."""
-    return sum((g * x for g, x in zip(row, values) if g), 0.0)
-
-
 @lru_cache(maxsize=64)
 def on_one_path(tree: AnyTree) -> list[list[bool]]:
-    """Whether the joints of two speeds lie on one path to the world, (nv, nv)."""
     before = [{i} for i in range(len(tree.parent))]
     for i, parent in enumerate(tree.parent):
         before[i] |= before[parent] if parent >= 0 else set()
@@ -92,7 +84,7 @@ def on_one_path(tree: AnyTree) -> list[list[bool]]:
 
 @lru_cache(maxsize=64)
 def lone_speeds(tree: AnyTree) -> frozenset[int]:
-    """The speeds of free bodies that stand alone: three slides and a ball from the world, and nothing on them."""
+    """The speeds of free bodies (three slides and a ball from the world) that carry nothing."""
     lone: set[int] = set()
     for i in range(3, len(tree.kind)):
         chain = [i - 3, i - 2, i - 1, i]

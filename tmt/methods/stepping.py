@@ -1,10 +1,10 @@
 """What a method of integration is, `Method`, and the `Dynamics` that its `slope` asks for accelerations.
 
 Another way to have accelerations is a subclass of Dynamics: with calls in compiled code (forms.py), with
-derivatives by those of the linear system (derivatives.py). What a method is able to do is said by its fields;
-nothing asks for its type.
+derivatives by those of the linear system (derivatives.py).
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -16,7 +16,7 @@ from tmt.derivation import method
 from tmt.derivation.coordinates import FLAT, Coordinates, Flat
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import Terms
-from tmt.derivation.vectors import Rows, Scalar, Scalars, Values, solve, solve_any
+from tmt.derivation.vectors import Rows, Scalar, Values, added, minus, plus, solve, solve_any, weighted
 from tmt.model.values import listed, real_numbers, shown
 
 Slope = Callable[[Values, Values], Values]
@@ -55,7 +55,7 @@ class Dynamics:
         force = method.reduced_force(tree, h, q, qd, tau)
         if held is None:
             return solve(M, force)
-        matrix = [plus(*rows) for rows in zip(M, held.matrix)]
+        matrix = added(M, held.matrix)
         if held.bias_rows:
             rates = self.bias_rates(tree, q, qd)
             for i in held.bias_rows:
@@ -72,8 +72,8 @@ class Dynamics:
 LITERAL = Dynamics()
 
 
-class Method:
-    """A method of integration. Another one is a subclass with a `step`; it must be hashable, as a frozen dataclass is.
+class Method(ABC):
+    """A method of integration. Another one is a hashable subclass with a `step`, such as a frozen dataclass.
 
     `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it
     asks `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's
@@ -100,12 +100,11 @@ class Method:
     def slope(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
     ) -> Values:
-        """qdd from Mbar qdd = tau - D qd - h."""
         return dynamics.acceleration(tree, q, qd, tau)
 
+    @abstractmethod
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
         """The state (q, qd) one dt later, from `slope(q, qd)`."""
-        raise NotImplementedError
 
 
 def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values, dt: Scalar) -> State:
@@ -114,25 +113,11 @@ def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values
 
 
 def increments(dt: Scalar, weights: Sequence[float], slopes: Sequence[Values], n: int) -> Values:
-    """dt * sum of weights * slopes, (n,); 0.0 where there are none."""
-    return advance([0.0] * n, dt, weights, slopes)
+    return [dt * weighted(weights, (slope[k] for slope in slopes)) for k in range(n)]
 
 
 def advance(start: Values, dt: Scalar, weights: Sequence[float], slopes: Sequence[Values]) -> Values:
-    """start + dt * sum of weights * slopes, component by component."""
-    result = []
-    for k, value in enumerate(start):
-        terms = [slope[k] if w == 1.0 else w * slope[k] for w, slope in zip(weights, slopes) if w != 0.0]
-        result.append(value + dt * sum(terms[1:], terms[0]) if terms else value)
-    return result
-
-
-def plus(first: Scalars, second: Scalars) -> Values:
-    return [a + b for a, b in zip(first, second)]
-
-
-def minus(first: Scalars, second: Scalars) -> Values:
-    return [a - b for a, b in zip(first, second)]
+    return plus(start, increments(dt, weights, slopes, len(start)))
 
 
 @dataclass(frozen=True)
@@ -160,9 +145,9 @@ class Tableau(Method):
         if abs(sum(self.b) - 1.0) > 1e-14:
             raise ValueError(f"b sums to {sum(self.b)}, not to 1")
 
+    @abstractmethod
     def check_row(self, i: int, row: Numbers) -> None:
         """Raise ValueError if row i of A has not as many entries as the kind of method wants."""
-        raise NotImplementedError
 
     def set_rows(self, name: str) -> None:
         self.set_plain(name, tuple(numbers(name, row) for row in listed(getattr(self, name)) or (None,)))

@@ -45,7 +45,6 @@ class Carrier(NamedTuple):
         return tuple(tuple(row) for row in self.turn @ Matrix(axes))
 
     def onward(self, origin: Vector, turn: Matrix) -> Carrier:
-        """The same of another frame, which is fixed in this one."""
         turned = self.turn if turn is IDENTITY else self.turn @ turn
         return Carrier(self.joint, Vector(*self.point(tuple(origin))), turned)
 
@@ -104,7 +103,6 @@ def locked(tree: Mechanism[float], angles: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def chosen(values: Sequence[Value], places: Sequence[int]) -> tuple[Value, ...]:
-    """The values at some places; () of none."""
     return tuple(values[i] for i in places) if values else ()
 
 
@@ -122,7 +120,6 @@ def _refuse_fed_back(tree: Mechanism[float], locked_names: Any, q: Sequence[floa
 
 
 def _fixed(tree: Mechanism[float], i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
-    """Origin and turn of joint i's frame in its parent's: at the reference it rounds nothing."""
     joint = tree.coordinates.joints[i]
     if any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]:
         return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)
@@ -130,7 +127,6 @@ def _fixed(tree: Mechanism[float], i: int, q: Sequence[float]) -> tuple[Vector, 
 
 
 def _position(kind: str, value: Any) -> tuple[float, ...]:
-    """A position that is given for one joint: one number, or the four of a quaternion."""
     if kind != "ball":
         return numbers_of("lock", [value], (1,))
     (quaternion,) = numbers_of("lock", [value], (1, 4))

@@ -51,9 +51,8 @@ def accepts_former_names(cls: Any) -> Any:
 
     cls.__init__ = __init__
     for former in FORMER:
-        setattr(
-            cls, former, property(partial(value, former=former), doc=f"Former name of `{FORMER[former]}`.")
-        )
+        doc = f"Former name of `{FORMER[former]}`."
+        setattr(cls, former, property(partial(value, former=former), doc=doc))
     return cls
 
 
@@ -75,7 +74,8 @@ class Tree(Mechanism[float]):
     joint_names : (n,) of all joints
     parent : (n,) index of the joint before this one, always a smaller one; -1: fixed to the world
     offset : (n, 3), m, from the origin of the parent's frame to this joint, in the parent's frame
-    axis : (nv, 3) directions of the speeds, scaled to length 1; of a ball three at right angles, turning with it
+    axis : (nv, 3) directions of the speeds, scaled to length 1; of a ball three at right angles, which turn
+        with it
     damping : (nv,), N m s/rad or N s/m, force -damping * qd
     body_names : (m,)
     body_joint : (m,) index of the last joint that moves the body; -1: fixed to the world
@@ -201,7 +201,6 @@ def _kinds(values: Any, n: int) -> Names:
 
 
 def _indices(name: str, values: Iterable[float], ends: Iterable[int]) -> Indices:
-    """Numbers of joints before these ends, or -1."""
     indices = list(values)
     for i, (index, end) in enumerate(zip(indices, ends)):
         if index != int(index) or not -1 <= index < end:
@@ -211,7 +210,6 @@ def _indices(name: str, values: Iterable[float], ends: Iterable[int]) -> Indices
 
 
 def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
-    """The rows of a gain, (nv, nv); () where nothing is fed back."""
     if isinstance(values, tuple | list) and not values:
         return ()
     rows = numbers_of(name, values, (coordinates.nv, coordinates.nv))
@@ -237,7 +235,6 @@ def _check_axes(whose: str, axes: NDArray[np.float64]) -> None:
 
 
 def _direction(i: int, axis: Numbers[float]) -> Numbers[float]:
-    """The axis of speed i at length 1, however long it is."""
     exponent = math.frexp(max(map(abs, axis)))[1]
     axis = tuple(math.ldexp(a, -exponent) for a in axis)  # exact, and the squares neither overflow nor vanish
     length = float(np.linalg.norm(axis))

@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 
 
 def shown(value: Any) -> str:
-    """What was given, in one short line."""
     try:
         return textwrap.shorten(reprlib.repr(value), 90, placeholder=" ...")
     except Exception:  # a repr that fails, an int of too many digits
@@ -49,7 +48,6 @@ def _masked(values: Any) -> bool:
 
 
 def listed(values: Any) -> tuple[Any, ...] | None:
-    """The values of a list, a tuple or an array of one dimension; None of anything else."""
     is_row = isinstance(values, np.ndarray) and values.ndim == 1
     return tuple(values) if is_row or isinstance(values, (list, tuple)) else None
 
@@ -63,7 +61,6 @@ def names(field: str, values: Any) -> tuple[str, ...]:
 
 
 def numbers_of(name: str, values: Any, shape: tuple[int, ...]) -> Any:
-    """The values as nested tuples of float, after a check of their shape."""
     array = real_numbers(values)
     if array is None:
         raise ValueError(f"Tree.{name} is {shown(values)}; numbers of shape {shape} are expected")
@@ -92,7 +89,6 @@ def states(model: Mechanism[float], **arrays: ArrayLike) -> list[Array]:
 
 
 def _state(model: Mechanism[float], name: str, values: ArrayLike) -> Array:
-    """The values as an array (..., nq) of q, (..., 1) of dt, or (..., nv)."""
     n = {"q": model.coordinates.nq, "dt": 1}.get(name, model.coordinates.nv)
     array = real_numbers(values)
     if array is None:

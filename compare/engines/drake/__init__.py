@@ -68,7 +68,7 @@ class Model(ReadModel):
         slides = {f"{name} {part}" for name in file.free for part in "xyz"}
         expected = {name: k for k, name in enumerate(file.names) if name not in slides}
         if len(free) != len(file.free) or plant.num_velocities() != file.coordinates.nv:
-            raise OtherJoints(f"it has {plant.num_velocities()} speeds, the file {file.coordinates.nv}")
+            raise OtherJoints(plant.num_velocities(), file.coordinates.nv)
         if missing := [name for name in expected if name not in names.values()]:
             raise OtherNames(f"it has no joint {missing[0]!r}")
         self.joints = {index: expected[name] for index, name in names.items()}

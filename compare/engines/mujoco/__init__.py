@@ -8,14 +8,6 @@ from .source import ModelError, Source
 ENGINE = EngineRecord(
     order=10, label="MuJoCo", colour="#E69F00", marker="s", in_quick_runs=True, from_file=True
 )
-__all__ = [
-    "ModelError",
-    "Mujoco",
-    "Reading",
-    "Source",
-    "engine",
-    "has_hinges",
-    "parse",
-    "read",
-    "tree_with_sites",
-]
+__all__ = (
+    "ModelError", "Mujoco", "Reading", "Source", "engine", "has_hinges", "parse", "read", "tree_with_sites",
+)  # fmt: skip

@@ -1,11 +1,11 @@
 """MuJoCo's own functions for timing: called from a compiled loop, with no Python between two calls.
 
-The C library that the Python package brings is called by its functions' addresses from a few lines of LLVM's text.
+The C library that the Python package brings is called by its functions' addresses from LLVM's text.
 """
 
 import ctypes
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import mujoco
@@ -16,7 +16,7 @@ from tmt.compiled.machine import Library
 from .dynamics import MujocoDynamics
 from .names import bit
 
-Run = Callable[[int], None]  # how many times
+Run = Callable[[int], np.ndarray]  # how many times
 
 
 def library() -> str | None:
@@ -25,54 +25,37 @@ def library() -> str | None:
     return next((str(path) for pattern in patterns for path in sorted(folder.glob(pattern))), None)
 
 
-class MinimalCalls:
-    """MuJoCo's functions called by their addresses again and again at one state, with contact and constraint stages off."""
+def loops(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> dict[str, Run]:
+    """Each way's run(count), which repeats it at one state, without contacts and constraints; {}: no library.
 
-    def __init__(self, dynamics: MujocoDynamics):
-        self.qpos, self.dofs = dynamics.qpos, dynamics.dofs
-        self.model, self.data = dynamics.own_copy(1.0, "RK4")
-        self.model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
-        self.force, self.solution = np.zeros((2, self.model.nv))
+    q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work
+    is only what forward dynamics needs; it solves M a = h, without any torque.
+    """
+    if (path := library()) is None:
+        return {}
+    model, data = dynamics.own_copy(1.0, "RK4", q, v, tau)
+    model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
+    mujoco.mj_forward(model, data)
+    mass_matrix = "mj_makeM" if hasattr(ctypes.CDLL(path), "mj_makeM") else "mj_crb"
+    before, after = ("mj_kinematics", "mj_comPos", mass_matrix), ("mj_comVel", "mj_rne")
+    ways = {"mj_forward": ["mj_forward"], "equal work": [*before, "mj_factorM", *after, "mj_solveM"]}
+    # what the addresses point to lives as long as the call
+    return {f"MuJoCo, {way}": partial(repeat, path, tuple(names), model, data) for way, names in ways.items()}
 
-    @staticmethod
-    def unavailable() -> str | None:
-        return None if library() else "MuJoCo's library was not found in its package"
 
-    def loops(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> dict[str, Run]:
-        """For each way run(count), which repeats it count times at one state.
-
-        q, v, tau: (n,) rad, rad/s, N m. mj_forward does all that MuJoCo does for an acceleration; the equal work is only what
-        forward dynamics needs; it solves M a = h, without any torque.
-        """
-        self.place(q, v, tau)
-        mujoco.mj_forward(self.model, self.data)
-        path = library() or ""
-
-        def run(*names: str) -> Run:
-            loop = repeated(path, names)
-
-            # of self: what the addresses point to must live as long as the call
-            def repeat(count: int) -> None:
-                structures = self.model._address, self.data._address
-                loop(*structures, self.force.ctypes.data, self.solution.ctypes.data, count)
-
-            return repeat
-
-        mass_matrix = "mj_makeM" if hasattr(ctypes.CDLL(path), "mj_makeM") else "mj_crb"
-        before, after = ("mj_kinematics", "mj_comPos", mass_matrix), ("mj_comVel", "mj_rne")
-        return {
-            "MuJoCo, mj_forward": run("mj_forward"),
-            "MuJoCo, equal work": run(*before, "mj_factorM", *after, "mj_solveM"),
-        }
-
-    def place(self, q: np.ndarray, v: np.ndarray, tau: np.ndarray) -> None:
-        d = self.data
-        d.qpos[self.qpos], d.qvel[self.dofs], d.qfrc_applied[self.dofs] = q, v, tau
+def repeat(
+    path: str, names: tuple[str, ...], model: mujoco.MjModel, data: mujoco.MjData, count: int
+) -> np.ndarray:
+    """Call functions of the library in turn, count times: the bias and the acceleration, (2, nv)."""
+    results = np.zeros((2, model.nv))
+    addresses = model._address, data._address, *(row.ctypes.data for row in results)
+    repeated(path, names)(*addresses, count)
+    return results
 
 
 @cache
 def repeated(path: str, names: tuple[str, ...]) -> Callable[..., None]:
-    """run(model, data, bias, acceleration, count): functions of the library one after the other, count times."""
+    """run(model, data, bias, acceleration, count): functions of the library in turn, count times."""
     more = {"mj_rne": ", i32 0, ptr %bias", "mj_solveM": ", ptr %acceleration, ptr %bias, i32 1"}
     lines = ""
     for k, name in enumerate(names):

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from tmt.export.parameters import PAYLOAD, SIZES, Parameters
 from tmt.model.tree import Tree
 
+from .locked import compiled
 from .names import element_name
 from .source import Source, without_visuals
-from .welded import compiled
 
 Array = NDArray[np.float64]
 Values = Mapping[str, Array]  # of arguments by name

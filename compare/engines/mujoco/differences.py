@@ -1,4 +1,4 @@
-"""Derivatives in MuJoCo by finite differences: mjd_transitionFD, mjd_inverseFD, and differences of its own steps."""
+"""Derivatives in MuJoCo by differences: mjd_transitionFD, mjd_inverseFD, and those of its own steps."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,8 @@ Call = Callable[[], np.ndarray]
 
 
 def of_transition(
-    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, eps: float, centred: bool
+    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool,
+    eps: float,
 ) -> Call:  # fmt: skip
     """A call of mjd_transitionFD: A (2 nv, 2 nv) of a step from a state (movement, v) under constant torque.
 
@@ -46,7 +47,8 @@ def of_inverse(dynamics: MujocoDynamics, q: Array, v: Array, a: Array, eps: floa
 
 
 def of_steps(
-    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, eps: float, centred: bool
+    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool,
+    eps: float,
 ) -> Call:  # fmt: skip
     """A call of mj_step from states nearby: [A B] (2 nv, 3 nv) of a step of any integrator, B by torque."""
     n, coordinates = len(dynamics.dofs), dynamics.coordinates
@@ -67,15 +69,15 @@ def of_steps(
 
 
 def transition(dynamics: MujocoDynamics, q: Array, tau: Array, dt: float, integrator: str) -> np.ndarray:
-    """d(movement, speed)+/d(movement, speed) of one step at rest, (2nv, 2nv); q: (nq,) rad, m; tau: (nv,) N m."""
+    """d(movement, speed)+/d(movement, speed) of a step at rest, (2 nv, 2 nv); q: (nq,), tau: (nv,)."""
     n = len(dynamics.dofs)
-    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, NUDGE, centred=True)()[:, : 2 * n]
+    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, True, NUDGE)()[:, : 2 * n]
 
 
 def left_to_itself(
     dynamics: MujocoDynamics, q: Array, qd: Array, tau: Array, dt: float, steps: int, integrator: str
 ) -> dict[str, Any]:
-    """A run with MuJoCo's automatic reset: its clock's time (steps + 1,) s, q, qd; how many warnings there were."""
+    """A run with MuJoCo's automatic reset: its clock's time (steps + 1,) s, q, qd; number of warnings."""
     model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
     model.opt.disableflags &= ~bit("AUTORESET")
     path = [(0.0, q, qd)]

@@ -3,7 +3,8 @@
     q, v, a <-> qpos, qvel, qacc      h <-> qfrc_bias      tau <-> qfrc_applied
     M a + h = tau - D v
 
-MuJoCo's derived fields belong to the last mj_forward, not to the last step: every quantity is evaluated with mj_forward.
+MuJoCo's derived fields belong to the last mj_forward, not to the last step: every quantity is evaluated with
+mj_forward.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,11 +51,12 @@ class Engaged(NamedTuple):
 
 
 class MujocoDynamics:
-    """MuJoCo with one model; quantities at any states q (..., nq), v and tau (..., nv), joints in the case's order.
+    """MuJoCo with one model; quantities at states q (..., nq), v, tau (..., nv), joints in the case's order.
 
-    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the position
-    zero. bare: it is compared with a Tree that has the springs of the joints, and not the bodies that never move.
-    engaged: its actuators; of a given torque only the part beyond their constant part is applied.
+    bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the
+    position zero. bare: it is compared with a Tree that has the springs of the joints, and not the bodies
+    that never move. engaged: its actuators; of a given torque only the part beyond their constant part is
+    applied.
     """
 
     def __init__(
@@ -98,7 +100,7 @@ class MujocoDynamics:
         return T, B
 
     def convective_terms(self, q: Array, v: Array) -> Pair:
-        """v_conv, world, and w_conv, body axes, (..., m, 3): mj_objectAcceleration at qacc = 0 without gravity.
+        """v_conv, world, and w_conv, body axes, (..., m, 3): accelerations at qacc = 0 without gravity.
 
         mj_jacDot of MuJoCo 4.0 leaves out what a ball does to a slide after it in the same body.
         """
@@ -168,9 +170,8 @@ class MujocoDynamics:
     def additional_bodies(self) -> list[tuple[str, float]]:
         """Bodies with mass, kg, that are not among those of the case, by name."""
         others = np.setdiff1d(np.flatnonzero(self.model.body_mass), self.bodies)
-        return [
-            (element_name(self.model, "body", body), float(self.model.body_mass[body])) for body in others
-        ]
+        masses = self.model.body_mass[others].tolist()
+        return [(element_name(self.model, "body", body), mass) for body, mass in zip(others, masses)]
 
     @property
     def may_touch(self) -> bool:
@@ -219,7 +220,7 @@ class MujocoDynamics:
     def run(
         self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
-        """Motion under constant torque: q (..., steps + 1, nq), v (..., steps + 1, nv), NaN from where it diverges."""
+        """Motion under constant torque: q, v (..., steps + 1, n), NaN from where it diverges."""
         batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
         starts, follow = self.runner((q, v, tau), dt, steps, method, tolerance)
         q_path, v_path, ended = self.path(starts, follow(), dt)
@@ -250,9 +251,10 @@ class MujocoDynamics:
         return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
 
     def runner(
-        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance, threads: int = 1
+        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance,
+        threads: int = 1,
     ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:  # fmt: skip
-        """The first states, time first, and a call that runs MuJoCo's C loop from them to (runs, steps, ...)."""
+        """The first states, time first, and a call of MuJoCo's C loop from them to (runs, steps, ...)."""
         if tolerance is not None:
             raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
         model, data = self.own_copy(dt, method)

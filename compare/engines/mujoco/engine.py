@@ -1,4 +1,4 @@
-"""MuJoCo as an engine: a compiled model, what a case changes in it, and its actuators under constant controls."""
+"""MuJoCo as an engine: a compiled model, what a case changes in it, actuators at constant controls."""
 
 from collections.abc import Mapping, Sequence
 from copy import copy
@@ -25,12 +25,13 @@ FROM_4 = int(mujoco.__version__.split(".")[0]) >= 4
 
 
 def methods_for(tree: Tree | None = None) -> dict[str, Method]:
-    """MuJoCo's integrators for a Tree, by name, each with the method of tmt that is the same scheme; None: only hinges.
+    """MuJoCo's integrators for a Tree, by name, each with the same scheme of tmt; None: only hinges.
 
-    Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own; discrete also
-    in springs. Up to 3.17 RK4 turns a ball by the mean of its speeds, and implicitfast uses a midpoint rule for a free
-    body on its own, which tmt does not have: it is left out. In the speed gain of actuators implicitfast and implicit
-    are implicit where two joints are on one path to the world; discrete everywhere, and in the position gain too.
+    Measured step by step: implicitfast and discrete are implicit in the bias of a free body on its own;
+    discrete also in springs. Up to 3.17 RK4 turns a ball by the mean of its speeds, and implicitfast uses a
+    midpoint rule for a free body on its own, which tmt does not have: it is left out. In the speed gain of
+    actuators implicitfast and implicit are implicit where two joints are on one path to the world; discrete
+    everywhere, and in the position gain too.
     """
     schemes, order = dict(SCHEMES), 4
     if tree is not None:
@@ -51,7 +52,8 @@ def methods_for(tree: Tree | None = None) -> dict[str, Method]:
 METHODS = methods_for()
 MODELS = 16  # most models of cases that an engine keeps
 UNLIMITED = (
-    "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited", "tendon_actfrclimited",
+    "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited",
+    "tendon_actfrclimited",
 )  # fmt: skip
 SOLVED, MOST_ITERATIONS = 1e-15, 100
 ACTING, IDLE = 0, 1  # groups of actuators
@@ -60,8 +62,8 @@ ACTING, IDLE = 0, 1  # groups of actuators
 class Mujoco(Engine):
     """MuJoCo with one compiled model.
 
-    bodies: their numbers in the model. tree: all that this Tree does not have is switched off, see inventory, and the
-    methods are those for it.
+    bodies: their numbers in the model. tree: all that this Tree does not have is switched off, see inventory,
+    and the methods are those for it.
     """
 
     name = "mujoco"
@@ -84,7 +86,8 @@ class Mujoco(Engine):
     def of(self, case: Case) -> MujocoDynamics:
         """The dynamics of a case: the file's own numbers with the changes of the case.
 
-        A model with locked joints is compiled again from the source, without them; ModelError if that is not possible.
+        A model with locked joints is compiled again from the source, without them; ModelError if that is not
+        possible.
         """
         controls = case.controller.controls if case.controller else None
         changes = tuple(case.locked.items()), case.scene.gravity, case.scene.damping, case.joints, controls
@@ -111,8 +114,8 @@ class Mujoco(Engine):
 def engaged(model: mujoco.MjModel, controller: Controller) -> Engaged:
     """Switch on the actuators of a model that take part, without any range.
 
-    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method (with PGS
-    it is Euler's scheme). Activations are constant, see set_control.
+    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method
+    (with PGS it is Euler's scheme). Activations are constant, see set_control.
     """
     model.opt.disableflags &= ~bit("ACTUATION")
     set_fields(model, UNLIMITED, 0)

@@ -1,4 +1,4 @@
-"""Forces of a compiled model near a state, linear in its deviation: actuators, springs and dampers, rows of constraints."""
+"""Forces near a state, linear in its deviation: actuators, springs and dampers, rows of constraints."""
 
 from typing import NamedTuple
 
@@ -8,6 +8,7 @@ import numpy as np
 from .step import NUDGE, Step
 
 QUADRATIC = int(mujoco.mjtConstraintState.mjCNSTRSTATE_QUADRATIC)  # a row whose force is linear
+CONTACTS = int(mujoco.mjtConstraint.mjCNSTR_CONTACT_FRICTIONLESS)  # the first of their types
 
 
 class Rows(NamedTuple):
@@ -26,8 +27,8 @@ class Rows(NamedTuple):
 class Forces(NamedTuple):
     """Forces near a state, and their derivatives by its deviation (n of them).
 
-    smooth: d(actuators + springs and dampers), (nv, n). rows: that act at the state. dJf: d(J' f) with constant f, (nv, nv);
-    dR, daref: (k, n).
+    smooth: d(actuators + springs and dampers), (nv, n). rows: that act at the state. dJf: d(J' f) with
+    constant f, (nv, nv); dR, daref: (k, n).
     """
 
     smooth: np.ndarray
@@ -37,26 +38,17 @@ class Forces(NamedTuple):
     daref: np.ndarray
 
 
-def rows(step: Step, on: np.ndarray | None = None) -> Rows | None:
-    """Rows of the data of a step after mj_forward; on: which, (all,), by default those whose force is linear.
-
-    None: their number is another one than that of `on`.
-    """
+def rows(step: Step, on: np.ndarray) -> Rows | None:
+    """Rows of the data of a step after mj_forward; on: which, (all,). None: their number is another one."""
     m, d = step.model, step.data
-    if on is None:
-        on = d.efc_state == QUADRATIC
     if len(on) != d.nefc:
         return None
     J = np.zeros((d.nefc, m.nv))
     if mujoco.mj_isSparse(m):
         mujoco.mju_sparse2dense(J, d.efc_J, d.efc_J_rownnz, d.efc_J_rowadr, d.efc_J_colind)
     else:
-        J[:] = d.efc_J.reshape(J.shape)
-    contact = np.full(d.nefc, -1)
-    for number, (address, size) in enumerate(zip(d.contact.efc_address, d.contact.dim)):
-        if address >= 0:
-            count = 2 * (size - 1) if m.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL and size > 1 else size
-            contact[address : address + count] = number
+        J[:] = d.efc_J[: J.size].reshape(J.shape)  # it has room for rows that turned out to be empty
+    contact = np.where(d.efc_type >= CONTACTS, d.efc_id, -1)
     return Rows(J[on], d.efc_R[on].copy(), d.efc_aref[on].copy(), d.efc_force[on].copy(), contact[on])
 
 
@@ -72,7 +64,7 @@ def rows_at(step: Step, state: np.ndarray) -> tuple[np.ndarray, Rows]:
 
 
 def forces_near(step: Step, state: np.ndarray) -> Forces | None:
-    """The forces near a state at rest; None where rows begin or cease within the nudge: the edge of a contact."""
+    """The forces near a state at rest; None where rows begin or cease within the nudge."""
 
     def forward(by: np.ndarray | None) -> np.ndarray:
         """Actuators, springs and dampers; the data are those at the moved state."""

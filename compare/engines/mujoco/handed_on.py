@@ -1,4 +1,4 @@
-"""The compiled model for other engines: as it is, and as a URDF text where a reader of MJCF loses masses or joints."""
+"""The compiled model for other engines: as it is, and as a URDF for those that read MJCF in part."""
 
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
@@ -24,10 +24,10 @@ def urdf(compiled: mujoco.MjModel) -> str:
 
     Free joints are of type floating, of which readers make what they like.
 
-    Numbers have 17 significant digits; positions are those of the file (`ref` included), joints have its names. The
-    frame of a link has its origin on the axis of its hinge. Of several joints in one body all but the last move a link
-    without mass, and a body without a joint hangs on a fixed one. URDF has no gravity, armature or springs; geoms, limits
-    and friction are left out.
+    Numbers have 17 significant digits; positions are those of the file (`ref` included), joints have its
+    names. The frame of a link has its origin on the axis of its hinge. Of several joints in one body all but
+    the last move a link without mass, and a body without a joint hangs on a fixed one. URDF has no gravity,
+    armature or springs; geoms, limits and friction are left out.
     """
     model = mujoco.MjModel.__copy__(compiled)
     take_away(model)  # what a flag of the file disables is zero
@@ -114,16 +114,16 @@ def unused(name: str, names: list[str]) -> str:
 class Bare:
     """The compiled model of a file with all that a Tree does not have taken away or switched off.
 
-    names: of the Tree's joints. rotors_in_joints: the armature of actuators is that of their joints. controller: of the
-    actuators that act, with `engaged` controls; None: none does. qpos (nq,), dofs (nv,): the indices of the Tree's
-    coordinates and speeds in MuJoCo's.
+    names: of the Tree's joints. rotors_in_joints: the armature of actuators is that of their joints.
+    controller: of the actuators that act, with `engaged` controls; None: none does. qpos (nq,), dofs (nv,):
+    the indices of the Tree's coordinates and speeds in MuJoCo's.
     """
 
     engaged = Engaged()
 
     def __init__(
-        self, source: Source, names: Sequence[str], rotors_in_joints: bool = False, controller: Controller | None = None
-    ):  # fmt: skip
+        self, source: Source, names: Sequence[str], rotors_in_joints: bool, controller: Controller | None
+    ):
         m = self.model = source.without({}, bare=controller is None)
         switch_off(m)
         # MuJoCo Warp refuses the first; with the second its implicitfast is explicit in the damping

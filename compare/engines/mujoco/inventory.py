@@ -1,4 +1,4 @@
-"""The features of a file: modelled by the equations, switched off by the comparison, or a reason to refuse the file."""
+"""The features of a file: modelled by the equations, switched off, or a reason to refuse the file."""
 
 from collections.abc import Iterable
 
@@ -121,14 +121,14 @@ def set_fields(m: mujoco.MjModel, names: Iterable[str], value: int) -> None:
 
 
 NOT_HAD_FIELDS = (
-    "body_gravcomp", "dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield", "actuator_damping", "actuator_dampingpoly",
-    "tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield", "tendon_damping", "tendon_dampingpoly",
-    "dof_frictionloss", "tendon_frictionloss",
+    "body_gravcomp", "dof_dampingpoly", "jnt_stiffnesspoly", "jnt_springyield", "actuator_damping",
+    "actuator_dampingpoly", "tendon_stiffness", "tendon_stiffnesspoly", "tendon_springyield", "tendon_damping",
+    "tendon_dampingpoly", "dof_frictionloss", "tendon_frictionloss",
 )  # fmt: skip
 
 
 def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
-    """The pairs of geoms that may touch, (pairs, 2): those that the file names, and those of bodies that move relatively."""
+    """The pairs of geoms that may touch, (pairs, 2): by the file, or of bodies that move relatively."""
     i, j = np.triu_indices(m.ngeom, 1)
     one, other = np.sort([m.geom_bodyid[i], m.geom_bodyid[j]], axis=0)
     a, b = m.body_weldid[one], m.body_weldid[other]
@@ -144,9 +144,9 @@ MOST = 1e30  # in size, of every number that is compared: products of several ar
 STEPS = 1e-6, 5.0  # s, of the file
 MOST_SPEEDS = 1000  # of a model: Mbar of a state has the square of it
 NUMBERS = (
-    "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis", "jnt_stiffness",
-    "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear", "tendon_stiffness",
-    "tendon_damping",
+    "body_pos", "body_quat", "body_mass", "body_inertia", "body_ipos", "body_iquat", "jnt_pos", "jnt_axis",
+    "jnt_stiffness", "dof_armature", "dof_damping", "actuator_gainprm", "actuator_biasprm", "actuator_gear",
+    "tendon_stiffness", "tendon_damping",
 )  # fmt: skip
 UNITS = {"mass": " kg", "inertia": " kg m2", "armature": " kg m2", "gravity": " m/s2", "timestep": " s"}
 NOT_NEGATIVE = ("jnt_stiffness", "dof_armature", "dof_damping")

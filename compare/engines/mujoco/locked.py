@@ -1,21 +1,94 @@
-"""A compiled model with some of its joints locked: they are not there, and all else is where they hold it."""
+"""Compiled models with joints locked, which are not there, and with bodies that are welded, or have no mass, as one."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import mujoco
 import numpy as np
 
+from ...robots.coordinates import point_inertia
 from .inventory import contact_pairs
-from .names import aligns, element_name, joint_name, joint_places, kind_of, parts_of, rotors
-from .welded import compiled
+from .names import aligns, element_name, joint_name, joint_places, kind_of, parts_of, rotors, tensor
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
 PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
 Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m or a quaternion
+# kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other
+LEAST = 1e-14
+LIGHT = 1e-6  # share of a mass, and of M at the position zero, that stands for none
+NO_MASS = "mass and inertia of moving bodies"  # in MuJoCo's message
+
+
+def compiled(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """The model of a spec, also where a link without mass carries others, which MuJoCo refuses."""
+    try:
+        return spec.compile()
+    except ValueError as error:
+        if NO_MASS not in str(error) or spec.compiler.settotalmass > 0.0:
+            raise
+    stated = spec.compiler.boundmass, spec.compiler.boundinertia
+    spec.compiler.boundmass = spec.compiler.boundinertia = LEAST
+    model = spec.compile()
+    spec.compiler.boundmass, spec.compiler.boundinertia = stated
+    model.body_mass[model.body_mass == LEAST] = 0.0
+    model.body_inertia[model.body_inertia == LEAST] = 0.0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
+    if empty := [int(body) for body in model.jnt_bodyid if not model.body_subtreemass[body]]:
+        name = element_name(model, "body", empty[0])
+        raise ValueError(f"{name} moves, and neither it nor what it carries has mass")
+    return model
+
+
+def welded_bodies(model: mujoco.MjModel) -> dict[int, int]:
+    """The bodies with mass and without a joint, and the body to which each is fixed, 0: the world.
+
+    Those of negligible mass are among them, fixed to the world.
+    """
+    massive = (model.body_mass > 0.0) | (model.body_inertia > 0.0).any(axis=1)
+    bodies = np.flatnonzero(massive & (model.body_weldid != np.arange(model.nbody)))
+    welded = {int(body): int(model.body_weldid[body]) for body in bodies}
+    return welded | dict.fromkeys(negligible(model, np.flatnonzero(massive)), 0)
+
+
+def negligible(model: mujoco.MjModel, bodies: np.ndarray) -> list[int]:
+    """Those of some bodies that move with others, and whose mass and inertia stand for none."""
+    most = LIGHT * model.body_subtreemass[model.body_weldid[bodies]]
+    found = []
+    for body in bodies[(model.body_mass[bodies] <= most) & (model.body_weldid[bodies] > 0)]:
+        without = mujoco.MjModel.__copy__(model)
+        without.body_mass[body] = without.body_inertia[body] = 0.0
+        mujoco.mj_setConst(without, mujoco.MjData(without))
+        if np.allclose(without.dof_M0, model.dof_M0, rtol=LIGHT, atol=0.0):
+            found.append(int(body))
+    return found
+
+
+def join(model: mujoco.MjModel, welded: Mapping[int, int]) -> None:
+    """Give each body the mass, centre of mass and inertia of those welded to it, which lose theirs."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    fixed = [body for body, base in welded.items() if not base]
+    model.body_mass[fixed], model.body_inertia[fixed] = 0.0, 0.0
+    for base in set(welded.values()) - {0}:
+        group = [base, *(body for body, onto in welded.items() if onto == base)]
+        masses, centres = model.body_mass[group], data.xipos[group]
+        com, total = masses @ centres / masses.sum(), np.zeros((3, 3))
+        for body, mass, centre in zip(group, masses, centres - com):
+            total += tensor(data.ximat[body].reshape(3, 3), model.body_inertia[body])
+            total += point_inertia(centre, mass)
+        turn = data.xmat[base].reshape(3, 3)
+        moments, axes = np.linalg.eigh(turn.T @ total @ turn)
+        axes[:, 0] *= np.sign(np.linalg.det(axes))
+        model.body_mass[group], model.body_inertia[group] = 0.0, 0.0
+        model.body_mass[base], model.body_inertia[base] = masses.sum(), moments
+        model.body_ipos[base] = turn.T @ (com - data.xpos[base])
+        mujoco.mju_mat2Quat(model.body_iquat[base], axes.ravel())
+        model.body_sameframe[base] = model.body_simple[base] = 0
+        model.dof_simplenum[:] = 0
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def compiled_without(spec: mujoco.MjSpec, positions: Positions, bare: bool) -> mujoco.MjModel:
-    """The model whose bodies and other joints are placed as mj_kinematics places them with the joints locked."""
+    """The model whose bodies and other joints are where mj_kinematics has them with the joints locked."""
     model = compiled(spec)
     data, places = mujoco.MjData(model), joint_places(model)
     data.qpos[:] = model.qpos0
@@ -84,27 +157,44 @@ def add_parts(
 
 
 def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
-    """Delete what refers to joints of these names, then the joints: the other way round MuJoCo crashes."""
-    elements = [*spec.keys, *spec.sensors]
-    elements += [tie for tie in spec.equalities if bare or {tie.name1, tie.name2} & removed]
-    for actuator in spec.actuators:
-        if actuator.target in removed or (bare and not actuator.armature):
-            elements.append(actuator)
-    elements += spec.tendons if bare else []
-    for element in (*elements, *[joint for joint in spec.joints if joint.name in removed]):
+    """Delete joints of these names, and what refers to them."""
+    needless = [*spec.keys, *spec.sensors]
+    if bare:
+        needless += [*spec.equalities, *(actuator for actuator in spec.actuators if not actuator.armature)]
+    for element in needless:
+        spec.delete(element)
+    delete_named(spec, spec.tendons if bare else ())
+    delete_named(spec, [joint for joint in spec.joints if joint.name in removed])
+
+
+def delete_named(spec: mujoco.MjSpec, elements: Collection[mujoco.MjsJoint | mujoco.MjsTendon]) -> None:
+    """Delete elements after what refers to them: the other way round MuJoCo crashes."""
+    names = {element.name for element in elements} - {""}
+    for element in (*spec.equalities, *spec.actuators, *spec.sensors):
+        fields = "name1", "name2", "target", "objname"
+        if names.intersection(getattr(element, field, "") for field in fields):
+            spec.delete(element)
+    for element in elements:
         spec.delete(element)
 
 
-def delete_meshes(spec: mujoco.MjSpec) -> None:
-    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
-    elements = [*spec.sensors, *spec.tuples, *spec.pairs]
-    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
-    elements += [geom for geom in meshes if not gives_inertia(geom)]
-    for element in elements:
+def delete_geoms(spec: mujoco.MjSpec, geoms: Collection[mujoco.MjsGeom]) -> None:
+    """Delete geoms, pairs of them, and meshes and height fields that no geom has then."""
+    names = {geom.name for geom in geoms} - {""}
+    pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & names]
+    for element in (*pairs, *geoms):
         spec.delete(element)
     used = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
     for asset in [asset for asset in (*spec.meshes, *spec.hfields) if asset.name not in used]:
         spec.delete(asset)
+
+
+def delete_meshes(spec: mujoco.MjSpec) -> None:
+    """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
+    for element in (*spec.sensors, *spec.tuples):
+        spec.delete(element)
+    meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
+    delete_geoms(spec, [geom for geom in meshes if not gives_inertia(geom)])
 
 
 def gives_inertia(geom: mujoco.MjsGeom) -> bool:

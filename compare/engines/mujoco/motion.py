@@ -1,22 +1,20 @@
-"""What a robot does: motions of a file with everything on, which smaller models of the file repeat; and what they use."""
+"""Motions of a file with everything on, which smaller models of the file repeat; and what they use."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco import rollout
 
-from .names import INTEGRATORS, bit, control_of, element_name, number_of_actuators
+from .names import INTEGRATORS, bit, element_name, number_of_actuators
 
 Array = np.ndarray
-Places = Callable[[mujoco.MjModel], dict[str, tuple[slice, slice]]]  # joints or actuators
-STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
-INPUTS = sum(
-    int(getattr(mujoco.mjtState, f"mjSTATE_{name}"))
-    for name in ("CTRL", "QFRC_APPLIED", "MOCAP_POS", "MOCAP_QUAT")
-)
+HELD = "QFRC_APPLIED", "MOCAP_POS", "MOCAP_QUAT"
+STATE = int(mujoco.mjtState.mjSTATE_FULLPHYSICS)
+INPUTS = sum(int(getattr(mujoco.mjtState, f"mjSTATE_{name}")) for name in ("CTRL", *HELD))
 NEAR, SAMPLES = 0.01, 25  # m, and states of a motion: pairs that came so near are told
 EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
 ACTS = {  # what has a row of constraints, by the kinds of rows
@@ -36,68 +34,65 @@ TIMERS = {  # the stages of a step by MuJoCo's timers
 
 def joints(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     """The places in qpos and qvel of each joint."""
-    ends_q, ends_v = [*model.jnt_qposadr[1:], model.nq], [*model.jnt_dofadr[1:], model.nv]
-    places = {}
-    for number, (q, v) in enumerate(zip(model.jnt_qposadr, model.jnt_dofadr)):
-        name = element_name(model, "joint", number)
-        places[name] = slice(int(q), int(ends_q[number])), slice(int(v), int(ends_v[number]))
-    return places
+    ends = [*model.jnt_qposadr.tolist(), model.nq], [*model.jnt_dofadr.tolist(), model.nv]
+    q, v = ([slice(*pair) for pair in pairwise(places)] for places in ends)
+    return {element_name(model, "joint", number): (q[number], v[number]) for number in range(model.njnt)}
 
 
-def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
-    """The places in ctrl and act of each actuator."""
-    places = {}
-    for number in range(number_of_actuators(model)):
-        control, count = control_of(model, number)
-        act, acts = max(0, model.actuator_actadr[number]), model.actuator_actnum[number]
-        name = element_name(model, "actuator", number)
-        places[name] = slice(control, control + count), slice(act, act + acts)
-    return places
-
-
-def columns(model: mujoco.MjModel, whole: mujoco.MjModel, places: Places) -> tuple[Array, Array]:
-    """Where the joints or actuators of a model are in the vectors of the whole model, as in joints or actuators."""
-    among, first, second = places(whole), list[int](), list[int]()
-    for name in places(model):
-        for numbers, place in zip((first, second), among[name]):
-            numbers += range(place.start, place.stop)
-    return np.array(first, dtype=int), np.array(second, dtype=int)
-
-
-def data_at(model: mujoco.MjModel, state: Array) -> mujoco.MjData:
-    """At a state of step.start_of."""
-    data = mujoco.MjData(model)
-    mujoco.mj_setState(model, data, state, mujoco.mjtState.mjSTATE_INTEGRATION)
+def data_at(model: mujoco.MjModel, state: Array, whole: mujoco.MjModel) -> mujoco.MjData:
+    """The data of the whole model, which may have fewer bodies, at a state of step.start_of of a model."""
+    data, shared = mujoco.MjData(whole), np.zeros(mujoco.mj_stateSize(model, STATE | INPUTS))
+    mujoco.mj_extractState(model, state, mujoco.mjtState.mjSTATE_INTEGRATION, shared, STATE | INPUTS)
+    mujoco.mj_setState(whole, data, shared, STATE | INPUTS)
     return data
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion of a whole model, which smaller ones repeat. Controls are constant between their times.
+    """A motion of a whole model whose elements have names; controls are constant between times.
 
-    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls, (times, nu).
+    start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of
+    each actuator, (times, controls of it).
     """
 
     name: str
     duration: float  # s
     start: mujoco.MjData
     times: Array  # s
-    inputs: Array
+    inputs: Mapping[str, Array]
 
     def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
         """The data of a model at the start."""
         data, start = mujoco.MjData(model), self.start
-        q, v = columns(model, start.model, joints)
-        controls, activations = columns(model, start.model, actuators)
-        data.qpos[:], data.qvel[:], data.qfrc_applied[:] = start.qpos[q], start.qvel[v], start.qfrc_applied[v]
-        data.ctrl[:], data.act[:] = self.inputs[0, controls], start.act[activations]
+        for joint in joints(model):
+            here, there = data.joint(joint), start.joint(joint)
+            here.qpos[:], here.qvel[:], here.qfrc_applied[:] = there.qpos, there.qvel, there.qfrc_applied
+        for actuator in actuators(model):
+            data.actuator(actuator).ctrl[:] = self.inputs[actuator][0]
+            data.act[activations(model, actuator)] = start.act[activations(start.model, actuator)]
         data.mocap_pos[:], data.mocap_quat[:] = start.mocap_pos, start.mocap_quat
         return data
 
     def controls(self, model: mujoco.MjModel, dt: float, steps: int) -> Array:
         """The controls of a model at each step, (steps, nu)."""
         at = np.searchsorted(self.times, dt * np.arange(steps) + EARLY, side="right") - 1
-        return self.inputs[np.maximum(at, 0)][:, columns(model, self.start.model, actuators)[0]]
+        inputs = [np.zeros((len(self.times), 0)), *(self.inputs[name] for name in actuators(model))]
+        return np.hstack(inputs)[np.maximum(at, 0)]
+
+
+def actuators(model: mujoco.MjModel) -> list[str]:
+    return [element_name(model, "actuator", number) for number in range(number_of_actuators(model))]
+
+
+def inputs_of(data: mujoco.MjData, times: int) -> dict[str, Array]:
+    """The controls of the data at a number of times, see Motion."""
+    return {name: np.tile(data.actuator(name).ctrl, (times, 1)) for name in actuators(data.model)}
+
+
+def activations(model: mujoco.MjModel, actuator: str) -> slice:
+    """The place in act of an actuator."""
+    first, count = model.actuator(actuator).actadr[0], model.actuator(actuator).actnum[0]
+    return slice(max(0, first), max(0, first) + count)
 
 
 class Path(NamedTuple):
@@ -143,9 +138,8 @@ class Simulation:
     def __call__(self) -> list[Path]:
         nq, nv, paths = self.model.nq, self.model.nv, []
         for start, inputs in self.runs:
-            states, _ = rollout.rollout(
-                self.model, self.data, start, inputs[None], control_spec=INPUTS, nstep=len(inputs)
-            )
+            options = {"control_spec": INPUTS, "nstep": len(inputs)}
+            states, _ = rollout.rollout(self.model, self.data, start, inputs[None], **options)
             path = np.vstack([start, states[0]])[:, : 1 + nq + nv]
             failed = np.cumsum(~(np.diff(path[:, 0], prepend=-1.0) > 0.0)) > 0  # its clock stands still
             path[failed] = np.nan
@@ -165,12 +159,13 @@ class Simulation:
 
 
 def movements(path: Path, other: Path, among: Iterable[str] = ()) -> dict[str, float]:
-    """How far two paths are apart at their common times: the largest of each joint that both have, rad or m, and point."""
+    """How far two paths are apart at common times: the largest of each common joint and point, rad or m."""
     steps = max(path.dt, other.dt)
     every, every_other = round(steps / path.dt), round(steps / other.dt)
     q, whole = path.q[::every], other.q[::every_other]
     count = min(len(q), len(whole))
-    same = whole[:count, columns(path.model, other.model, joints)[0]]
+    places = joints(other.model)
+    same = np.hstack([whole[:count, places[name][0]] for name in joints(path.model)])
     apart = np.zeros((count, path.model.nv))
     for row, here, there in zip(apart, q[:count], same):
         mujoco.mj_differentiatePos(path.model, row, 1.0, there, here)
@@ -188,19 +183,17 @@ def apart(paths: Sequence[Path], others: Sequence[Path], points: Iterable[str] =
     return error if np.isfinite(error) else np.inf
 
 
-@dataclass
-class Use:
-    """What motions used: names of pairs of geoms that touched, of what acted by kind, how far each joint moved
-    from its first position, rad or m.
+class Use(NamedTuple):
+    """What motions used: pairs of geoms that touched, what acted by kind, how far joints moved.
 
     middle: the mean positions of the joints; of a joint with a quaternion the start.
     """
 
-    pairs: set[tuple[str, str]] = field(default_factory=set)
-    acted: dict[str, set[str]] = field(default_factory=dict)
-    has_constraints: bool = False
-    ranges: dict[str, float] = field(default_factory=dict)
-    middle: dict[str, Array] = field(default_factory=dict)
+    pairs: set[tuple[str, str]]
+    acted: dict[str, set[str]]
+    has_constraints: bool
+    ranges: dict[str, float]
+    middle: dict[str, Array]
 
     @property
     def geoms(self) -> set[str]:
@@ -209,28 +202,24 @@ class Use:
 
 def used(simulation: Simulation) -> Use:
     """What the motions of a model use, step by step."""
-    m, use, path, forces = simulation.model, Use(), [], np.zeros(len(simulation.data.actuator_force))
+    m, path, most_rows, forces = simulation.model, [], 0, np.zeros(len(simulation.data.actuator_force))
     pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
     for d in simulation.stepped():
         pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
         acts = (d.efc_force != 0.0) | (d.efc_type != ACTS["equality"][0])
         rows.update(zip(d.efc_type[acts].tolist(), d.efc_id[acts].tolist()))
-        use.has_constraints |= d.nefc > 0
-        forces = np.maximum(forces, np.abs(d.actuator_force))
+        most_rows, forces = max(most_rows, d.nefc), np.maximum(forces, np.abs(d.actuator_force))
         path.append(d.qpos.copy())
-    use.pairs = {pair_of(m, pair) for pair in pairs}
+    acted = {"actuator": {name for name, force in zip(actuators(m), forces) if force}}
     for kind, types in ACTS.items():
-        use.acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
-    numbers = range(number_of_actuators(m))
-    use.acted["actuator"] = {element_name(m, "actuator", number) for number in numbers if forces[number]}
-    q = np.array(path)
-    use.ranges = movements(
-        Path(m, simulation.dt, q, q), Path(m, simulation.dt, np.tile(q[0], (len(q), 1)), q)
-    )
+        acted[kind] = {element_name(m, kind, number) for row, number in rows if row in types}
+    q, middle = np.array(path), {}
+    still = np.tile(q[0], (len(q), 1))
+    ranges = movements(Path(m, simulation.dt, q, q), Path(m, simulation.dt, still, q))
     for name, (columns, _) in joints(m).items():
         is_number = columns.stop - columns.start == 1
-        use.middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
-    return use
+        middle[name] = q[:, columns].mean(axis=0) if is_number else q[0, columns]
+    return Use({pair_of(m, pair) for pair in pairs}, acted, most_rows > 0, ranges, middle)
 
 
 def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
@@ -239,7 +228,7 @@ def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
 
 
 def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
-    """How far each speed would move each other one, were it locked at a position: (nv, nv) rad or m, moved by locked.
+    """How far each speed would move each other one, were it locked: (nv, nv) rad or m, moved by locked.
 
     Its own movement times its coupling through M, the largest at positions (times, nq).
     """
@@ -255,7 +244,7 @@ def couplings(model: mujoco.MjModel, positions: Array, middle: Array) -> Array:
 
 
 def stages_of(simulation: Simulation) -> dict[str, float]:
-    """The time of each stage of a step, us, by MuJoCo's own timers: medians, as other programs may interrupt a step."""
+    """The time of each stage of a step, us, by MuJoCo's timers: medians, as a step may be interrupted."""
     durations = np.array([data.timer.duration.copy() for data in simulation.stepped()])
     steps = 1e6 * np.median(np.diff(durations, axis=0), axis=0)
 
@@ -269,7 +258,7 @@ def stages_of(simulation: Simulation) -> dict[str, float]:
 def near(
     model: mujoco.MjModel, positions: Array, touched: set[tuple[str, str]]
 ) -> dict[tuple[str, str], float]:
-    """The pairs of geoms that came near and never touched, nearest first, and their least distances at positions, m."""
+    """The pairs of geoms that came near and never touched, and their least distances, m, nearest first."""
     wide, data = mujoco.MjModel.__copy__(model), mujoco.MjData(model)
     pairs: dict[tuple[str, str], float] = {}
     wide.geom_margin += NEAR

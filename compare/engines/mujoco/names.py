@@ -1,6 +1,7 @@
-"""MuJoCo's names and numbers: integrators, flags, rotations, and the joints of a compiled model as those of a Tree.
+"""MuJoCo's names and numbers: integrators, flags, rotations, the joints of a model as those of a Tree.
 
-A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a ball.
+A free joint is four joints of a Tree: slides along the world's x, y and z axes, read at the origin, and a
+ball.
 """
 
 from typing import Any, NamedTuple
@@ -13,10 +14,8 @@ from ...robots.coordinates import FREE, Coordinates
 
 Integer = int | np.integer[Any]
 # those that the installed version has; discrete came with 3.13
-MEMBERS = {
-    name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None)
-    for name in ("Euler", "implicitfast", "discrete", "implicit", "RK4")
-}
+NAMES = "Euler", "implicitfast", "discrete", "implicit", "RK4"
+MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None) for name in NAMES}
 INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not None}
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
@@ -44,7 +43,7 @@ def on(m: mujoco.MjModel, flag: str) -> bool:
 
 
 def element_name(m: mujoco.MjModel, kind: str, number: Integer) -> str:
-    """The name of an element of a kind; `joint 3`, never another's name, where it has none that can be printed."""
+    """The name of an element; `joint 3`, never another's name, where it has none that can be printed."""
     stated, type_of = getattr(m, kind)(int(number)).name, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
     name = stated if stated.strip() and stated.isprintable() else f"{kind} {int(number)}"
     while name != stated and mujoco.mj_name2id(m, type_of, name) >= 0:

@@ -1,7 +1,8 @@
 """Parameters: the compiled model in the project's symbols, and what the file states compared with it.
 
-Stated numbers are converted: nested frames, angles, axes of length 1, tensors in the axes of the body. Where the file asks the
-compiler to change a number, the option is named. Remarks tell a user of it, and of what is fixed or switched off.
+Stated numbers are converted: nested frames, angles, axes of length 1, tensors in the axes of the body. Where
+the file asks the compiler to change a number, the option is named. Remarks tell a user of it, and of what is
+fixed or switched off.
 """
 
 from collections.abc import Mapping
@@ -25,7 +26,8 @@ from .source import Source, is_urdf
 STATED_FLAGS = {"flag gravity": "GRAVITY", "flag damper": "DAMPER", "flag eulerdamp": "EULERDAMP"}
 ABSENT = {  # in the equations, and forces at random states need not show them
     "damping beyond linear": "dof_dampingpoly", "stiffness beyond linear": "jnt_stiffnesspoly",
-    "actuator damping": "actuator_damping", "actuator armature": "actuator_armature", "tendon armature": "tendon_armature",
+    "actuator damping": "actuator_damping", "actuator armature": "actuator_armature",
+    "tendon armature": "tendon_armature",
 }  # fmt: skip
 # relative error of the principal axes of a `fullinertia`: up to 5e-7 was seen before 4.0, 1.4e-14 since
 TO_PRINCIPAL_AXES = 0.0 if FROM_4 else 1e-6
@@ -34,7 +36,8 @@ TO_PRINCIPAL_AXES = 0.0 if FROM_4 else 1e-6
 def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
     """Numbers of the compiled model: arrays per hinge, per body, or one number of the file, in world axes.
 
-    Read in the file's own configuration (qpos0): there every frame lies as the file says, for any `ref` of a hinge.
+    Read in the file's own configuration (qpos0): there every frame lies as the file says, for any `ref` of a
+    hinge.
     """
     m, d, bodies = dynamics.model, dynamics.data, dynamics.bodies
     dynamics.forward(m.qpos0[dynamics.qpos])
@@ -66,7 +69,7 @@ def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
 
 
 def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
-    """Sums of the lengths that MuJoCo adds to place each anchor, and each centre of mass relative to its anchor, m."""
+    """Sums of the lengths that place each anchor, and each centre of mass relative to its anchor, m."""
     m, to_body = dynamics.model, np.zeros(dynamics.model.nbody)
     for body in range(1, m.nbody):
         to_body[body] = to_body[m.body_parentid[body]] + np.linalg.norm(m.body_pos[body])
@@ -79,9 +82,8 @@ def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
 
 def last_hinge(m: mujoco.MjModel, body: int) -> int:
     """The last hinge that moves a body, by its number, -1: none."""
-    while body and not m.body_jntnum[body]:
-        body = m.body_parentid[body]
-    return int(m.body_jntadr[body] + m.body_jntnum[body] - 1) if body else -1
+    mover = m.body_weldid[body]
+    return int(m.body_jntadr[mover] + m.body_jntnum[mover] - 1) if m.body_jntnum[mover] else -1
 
 
 Options = Mapping[str, bool]  # of the file, and whether they are in force
@@ -99,7 +101,7 @@ class Stated(NamedTuple):
 
 
 def stated_numbers(source: Source) -> list[Stated]:
-    """Every mass, position, tensor, axis, armature, damping and stiffness that a file, or MJCF text, states."""
+    """Every mass, position, tensor, axis, armature, damping and stiffness that a file states."""
     spec, model = source.spec, source.model
     if spec is None:
         return []
@@ -112,9 +114,10 @@ def stated_numbers(source: Source) -> list[Stated]:
 
 
 def row_of(number: Stated, options: Options, size: float | None = None, precision: float = 0.0) -> Stated:
-    """A row; of the options that are in force those count that may have changed a number that is not the stated one.
+    """A row; the options in force count where they may have changed a number that is not the stated one.
 
-    size: the sum of what is added in the number, None: its largest entry; precision: relative, of the compiler.
+    size: the sum of what is added in the number, None: its largest entry; precision: relative, of the
+    compiler.
     """
     stated = np.asarray(number.stated, float)
     tolerance = max(FACTOR * EPS, precision) * (float(np.abs(stated).max()) if size is None else size)
@@ -173,7 +176,7 @@ def of_joint(model: mujoco.MjModel, joint: mujoco.MjsJoint, number: int) -> list
 
 
 def in_frames(pos: ArrayLike, frame: mujoco.MjsFrame | None) -> tuple[np.ndarray, np.ndarray, float]:
-    """A position, (3,), through a frame of the file and those around it, the turn of all, and the sum of lengths."""
+    """A position, (3,), through a frame and those around it, their turn, and the sum of lengths."""
     place, turn = np.array(pos, float), np.eye(3)
     length = float(np.linalg.norm(place))
     while frame is not None:
@@ -194,9 +197,10 @@ def orientation(quat: np.ndarray, other: mujoco.MjsOrientation, options: mujoco.
 def stated_inertial(
     spec: mujoco.MjSpec, body: mujoco.MjsBody, com: np.ndarray, inertia: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """CoM, (3,) m, and tensor, (3, 3) kg m2, of a body's inertial, in the axes of the body; the sum of lengths, m.
+    """CoM, (3,) m, and tensor, (3, 3) kg m2, of an inertial in the axes of its body; the sum of lengths, m.
 
-    A spec does not say in which of the body's frames it is: in the one that comes closest to the compiled model.
+    A spec does not say in which of the body's frames it is: in the one that comes closest to the compiled
+    model.
     """
     stated = np.diag(body.inertia)
     if np.isfinite(body.fullinertia[0]):
@@ -225,7 +229,7 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
 
 
 def of_welded(source: Source) -> list[Finding]:
-    """Which bodies are one with another, of a Source that is joined; links without mass, or with negligible mass."""
+    """Which bodies of a joined Source are one with another; links without mass, or with a negligible one."""
     model, findings = source.model, []
     names = {body: element_name(model, "body", body) for body in range(model.nbody)}
     if pairs := [f"{names[body]} on {names[base]}" for body, base in source.welded.items() if base]:
@@ -242,7 +246,7 @@ def of_welded(source: Source) -> list[Finding]:
 
 
 def of_source(source: Source) -> list[Finding]:
-    """What is fixed of a URDF; for each option by which the compiler changed stated numbers, where it did, by quantity."""
+    """What is fixed of a URDF; where each option has changed stated numbers, by quantity."""
     model, findings = source.model, []
     if source.missing:
         findings.append(Finding("remarks", "missing", {"files": source.missing}))

@@ -1,4 +1,4 @@
-"""A file read as a Tree: the model as MuJoCo compiled it; all that the Tree does not have is listed and switched off."""
+"""A file read as a Tree, as MuJoCo compiled it; what the Tree does not have is listed and switched off."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -77,8 +77,8 @@ def read(origin: Source | Path | str | mujoco.MjModel) -> Reading:
 def tree_of(compiled: mujoco.MjModel, joints: Mapping[str, Place], bodies: Sequence[int]) -> tmt.Tree:
     """The Tree of a compiled model.
 
-    Frames are read where mj_kinematics puts them at the reference position: that honours `sameframe`. There all of the
-    Tree's frames are parallel to the world's, so that everything is in world axes.
+    Frames are read where mj_kinematics puts them at the reference position: that honours `sameframe`. There
+    all of the Tree's frames are parallel to the world's, so that everything is in world axes.
     """
     model, places = mujoco.MjModel.__copy__(compiled), list(joints.values())
     take_away(model)  # what a flag of the file disables is zero
@@ -162,17 +162,14 @@ def tree_with_sites(reading: Reading) -> tmt.Tree:
 def carriers(model: mujoco.MjModel, places: Sequence[Place]) -> list[int]:
     """The last joint of the Tree that moves each body, -1: none."""
     last = {int(model.jnt_bodyid[place.joint]): i for i, place in enumerate(places)}
-    joint_of_body = [-1]
-    for body in range(1, model.nbody):
-        joint_of_body.append(last.get(body, joint_of_body[model.body_parentid[body]]))
-    return joint_of_body
+    return [last.get(body, -1) for body in model.body_weldid.tolist()]
 
 
 def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
     """MuJoCo with all that the Tree does not have switched off.
 
-    solution: the Tree and the order of the bodies are its; its joints have the names of the file's. ModelError if a
-    joint does not move as many bodies there.
+    solution: the Tree and the order of the bodies are its; its joints have the names of the file's.
+    ModelError if a joint does not move as many bodies there.
     """
     tree = (solution or reading).tree
     bodies = bodies_as_in(solution, reading) if solution else reading.bodies
@@ -180,7 +177,7 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
-    """The numbers of the bodies of a file in the order of a solution's: on the same joint, by name or by order."""
+    """The bodies of a file in the order of a solution's: on the same joint, by name or by order."""
     numbers: dict[int, int] = {}
     for joint in solution.tree.joint_names:
         bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
@@ -206,9 +203,10 @@ def has_hinges(source: Source, names: Sequence[str]) -> bool:
 
 
 def parse(origin: Source | Path | str, tree: tmt.Tree) -> Mujoco:
-    """The engine for a file (a Path) or MJCF text; ModelError if it does not have exactly the hinges of the Tree.
+    """The engine for a file (a Path) or MJCF text; ModelError if it has not exactly the hinges of the Tree.
 
-    The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by its name.
+    The body that a hinge moves is known by the hinge; one of several on a hinge, or fixed to the world, by
+    its name.
     """
     source = origin if isinstance(origin, Source) else Source(origin)
     model, hinges, bodies = source.model, tree.joint_names, []

@@ -1,4 +1,4 @@
-"""A smaller file: what a motion does not use is taken out of an MjSpec, joints are locked, and it is written as MJCF."""
+"""A smaller file: an MjSpec without what a motion does not use, with joints locked, written as MJCF."""
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping
@@ -11,20 +11,32 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from .changed import state_as_compiled
-from .locked import Positions, compiled_without
+from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Source, is_from_geoms
+from .source import Source, delete_textures, is_from_geoms
 from .variants import of_base
-from .welded import compiled
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
     "equalities": "equality", "sites": "site", "bodies": "body",
 }  # fmt: skip
 OFF = int(mujoco.mjtLimited.mjLIMITED_FALSE)
-DRAWN = "skins", "lights", "cameras", "textures"
+DRAWN = "skins", "lights", "cameras"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
+
+
+def spec_with_points(source: Source, points: Iterable[str]) -> mujoco.MjSpec:
+    """A copy of the file's spec with sites at bodies with these names. ValueError for a name that no body or site has."""
+    assert source.spec is not None
+    spec = source.spec.copy()
+    sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
+    for name in points:
+        if name not in sites | bodies:
+            raise ValueError(f"the file has no body and no site {name!r}")
+        if name not in sites:
+            spec.body(name).add_site(name=name)
+    return spec
 
 
 class Smaller:
@@ -32,21 +44,13 @@ class Smaller:
 
     def __init__(self, spec: mujoco.MjSpec) -> None:
         self.spec = spec
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the first reading has them
+        with warnings.catch_warnings(action="ignore"):  # the first reading has them
             self.model = compiled(spec)
 
     @classmethod
     def whole(cls, source: Source, points: tuple[str, ...] = ()) -> "Smaller":
-        """The whole file. points: of bodies with such a name, sites are added. ValueError for a name that is neither."""
-        assert source.spec is not None
-        spec = source.spec.copy()
-        sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
-        for name in points:
-            if name not in sites | bodies:
-                raise ValueError(f"the file has no body and no site {name!r}")
-            if name not in sites:
-                spec.body(name).add_site(name=name)
+        """The whole file. points: see spec_with_points."""
+        spec = spec_with_points(source, points)
         first = cls(spec)
         for elements, kind in NAMED.items():
             for element in getattr(spec, elements):
@@ -60,7 +64,7 @@ class Smaller:
         return len(needless)
 
     def write(self, path: File, comment: str) -> None:
-        """Write the file, by MuJoCo with six digits; its meshes and height fields are copied into a folder beside it."""
+        """Write the file, by MuJoCo with six digits; meshes and height fields go into a folder beside it."""
         spec, origin = self.spec.copy(), File(self.spec.modelfiledir or ".").absolute()
         folder = assets_of(path)
         for number, asset in enumerate(files_of(spec)):
@@ -73,8 +77,7 @@ class Smaller:
         spec.comment = comment.replace("--", "- -")  # which XML does not allow
         spec.modelfiledir, spec.meshdir, spec.strippath = str(path.absolute().parent), "", False
         spec.texturedir = str(origin / spec.texturedir) if spec.textures else ""
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             compiled(spec)
             path.write_text(spec.to_xml(), encoding="utf-8")
 
@@ -90,26 +93,19 @@ def assets_of(path: File) -> File:
 
 
 def drawing(small: Smaller, use: Use) -> int:
-    """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, and their meshes."""
-    for material in small.spec.materials:
-        material.textures = [""] * len(material.textures)
-    return touchless(small, lambda geom: not (geom.contype or geom.conaffinity)) + sum(
-        small.delete(elements, lambda _: True) for elements in DRAWN
-    )
+    """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, meshes."""
+    count = delete_textures(small.spec) + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
+    return count + touchless(small, lambda geom: not (geom.contype or geom.conaffinity))
 
 
 def touchless(small: Smaller, is_needless: Callable[[mujoco.MjsGeom], bool]) -> int:
-    """Delete geoms, and meshes and height fields that no geom has then. The inertias stay as they were compiled."""
+    """Delete geoms, and meshes that no geom has then. The inertias stay as they were compiled."""
     spec = small.spec
     named = {name for pair in spec.pairs for name in (pair.geomname1, pair.geomname2)}
     needless = [geom for geom in spec.geoms if is_needless(geom) and geom.name not in named]
     if needless:
         state_as_compiled(spec, small.model, [body.id for body in spec.bodies])
-    for geom in needless:
-        spec.delete(geom)
-    meshes = {name for geom in spec.geoms for name in (geom.meshname, geom.hfieldname)}
-    for elements in ("meshes", "hfields"):
-        small.delete(elements, lambda asset: asset.name not in meshes)
+    delete_geoms(spec, needless)
     return len(needless)
 
 
@@ -128,18 +124,17 @@ def tendons(small: Smaller, use: Use) -> int:
 
 
 def limits(small: Smaller, use: Use) -> int:
-    """Limits of joints and tendons that never act; the range of a servo may be that of its joint, and stays."""
-    count = 0
-    for elements, kind in (("joints", "joint"), ("tendons", "tendon")):
-        limited = getattr(small.model, "jnt_limited" if kind == "joint" else "tendon_limited")
-        for element in getattr(small.spec, elements):
-            if limited[element.id] and element.name not in use.acted[kind]:
-                element.limited, count = OFF, count + 1
-    return count
+    """Limits of joints and tendons that never act; their ranges stay, as a servo may have the same."""
+    model, acted = small.model, use.acted
+    ends = [x for x in small.spec.joints if model.jnt_limited[x.id] and x.name not in acted["joint"]]
+    ends += [x for x in small.spec.tendons if model.tendon_limited[x.id] and x.name not in acted["tendon"]]
+    for element in ends:
+        element.limited = OFF
+    return len(ends)
 
 
 def stages(small: Smaller, use: Use) -> int:
-    """Whole stages: energy and other numbers that are only reported; contacts, or all constraints, where none occurred."""
+    """Whole stages: numbers that are only reported; contacts, or all constraints, where none occurred."""
     option = small.spec.option
     before = option.disableflags, option.enableflags
     option.enableflags &= ~REPORTED
@@ -181,7 +176,7 @@ FREE: dict[str, Edit] = {
 
 
 def tied_joints(model: mujoco.MjModel) -> list[list[str]]:
-    """The joints that can be locked, those together that a tendon or an equality of joints ties; not the base of a free robot."""
+    """The joints that can be locked, those tied by a tendon or an equality together; not a free base."""
     names, base = list(joints(model)), set(model.dof_jntid[of_base(model)].tolist())
     together = [joints_of(model, tendon) for tendon in range(model.ntendon)]
     for tie in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
@@ -204,22 +199,15 @@ def joints_of(model: mujoco.MjModel, tendon: int) -> list[int]:
 
 
 def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
-    """With joints locked at positions, and bodies that do not move in one another fused. ValueError where that cannot be."""
+    """With joints locked at positions, and bodies fused that move as one. ValueError where that cannot be."""
     if not positions:
         return small
     model, spec = small.model, small.spec.copy()
     numbers = {number for number, name in enumerate(joints(model)) if name in positions}
     tied = [tendon for tendon in range(model.ntendon) if numbers.intersection(joints_of(model, tendon))]
     gone = {element_name(model, "tendon", tendon) for tendon in tied}
-    for elements in (spec.equalities, spec.actuators, spec.sensors):
-        for element in list(elements):
-            names = {getattr(element, field, "") for field in ("name1", "name2", "target", "objname")}
-            if names & gone:
-                spec.delete(element)
-    for tendon in [tendon for tendon in spec.tendons if tendon.name in gone]:
-        spec.delete(tendon)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    delete_named(spec, [tendon for tendon in spec.tendons if tendon.name in gone])
+    with warnings.catch_warnings(action="ignore"):
         fixed = compiled_without(spec, of_parts(model, positions), bare=False)
     for tie in list(spec.equalities):
         bodies = [mujoco.mj_name2id(fixed, mujoco.mjtObj.mjOBJ_BODY, name) for name in (tie.name1, tie.name2)]

@@ -1,9 +1,9 @@
 """A file, or MJCF text, read once: what it states, and what MuJoCo compiles of it.
 
-Textures and visual meshes are nearly all of a robot's memory (252 MB of one quadruped, 22 kB without), and every copy
-copies them: what is only drawn is left out. No bodies are fused (fusestatic gives wrong inertias up to MuJoCo 3.10) and
-nothing is printed as XML (which has seven digits). A URDF's meshes are found by their packages, and its floating base
-hangs on the world.
+Textures and visual meshes are nearly all of a robot's memory (252 MB of one quadruped, 22 kB without), and
+every copy copies them: what is only drawn is left out. No bodies are fused (fusestatic gives wrong inertias
+up to MuJoCo 3.10) and nothing is printed as XML (which has seven digits). A URDF's meshes are found by their
+packages, and its floating base hangs on the world.
 """
 
 import os
@@ -11,6 +11,7 @@ import re
 import warnings
 from collections.abc import Collection
 from copy import copy
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -19,12 +20,13 @@ import mujoco
 import numpy as np
 
 from ...process.parts import is_pipe, named_by
-from .locked import FROM_GEOMS, Positions, compiled_without, delete_meshes, gives_inertia
+from . import locked
+from .locked import FROM_GEOMS, Positions, compiled, gives_inertia
 from .names import moving
-from .welded import compiled, join, welded_bodies
 
 # by MuJoCo, of a mesh that is not there or in another format
 UNREAD = ("Error opening file", "no decoder found")
+DECODED = ".stl", ".obj", ".msh"
 PACKAGES = "is looked for in a folder NAME beside the file or above it, else beside the file"
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
     "which cannot be read": f"package://NAME/... {PACKAGES}",
@@ -48,10 +50,11 @@ class ModelError(ValueError):
 class Source:
     """A file (a Path), MJCF text, or a model that was compiled elsewhere, of which a copy is taken.
 
-    origin: the Path or the text; None: compiled elsewhere. floating: whether the base of a URDF gets a free joint.
-    text: what it says. model: without what is only drawn. missing: the files of meshes and height fields that cannot be
-    read: geoms of them are left out. warnings: of MuJoCo's compiler, one line each. bodies, joints: their numbers in the
-    model, in the order of the spec. ModelError, in one line, where MuJoCo makes no model of it.
+    origin: the Path or the text; None: compiled elsewhere. floating: whether the base of a URDF gets a free
+    joint. text: what it says. model: without what is only drawn. missing: the files of meshes and height
+    fields that cannot be read: geoms of them are left out. warnings: of MuJoCo's compiler, one line each.
+    bodies, joints: their numbers in the model, in the order of the spec. ModelError, in one line, where
+    MuJoCo makes no model of it.
     """
 
     def __init__(self, origin: Path | str | mujoco.MjModel, floating: bool = False) -> None:
@@ -60,8 +63,6 @@ class Source:
         self.warnings: tuple[str, ...] = ()
         self.missing: tuple[str, ...] = ()
         self.welded: dict[int, int] = {}
-        self._spec: mujoco.MjSpec | None = None
-        self._bare: mujoco.MjSpec | None = None
         if isinstance(origin, mujoco.MjModel):
             self.model = mujoco.MjModel.__copy__(origin)
         elif isinstance(origin, Path | str):
@@ -80,10 +81,9 @@ class Source:
         capacity = mujoco.mj_getCacheCapacity(cache)
         mujoco.mj_setCacheCapacity(cache, 0)  # it would hold all meshes, in twice the memory of the model
         try:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                self._spec = parsed(origin, self.text, self.floating)
-                spec = self.compiled_spec(self._spec)
+            with warnings.catch_warnings(record=True, action="always") as caught:
+                self.spec = stated = parsed(origin, self.text, self.floating)
+                spec = self.compiled_spec(stated)
             bytes(self.model.names).decode()
         except UnicodeDecodeError:
             raise ModelError(f"{self} has names that are not UTF-8; save it as UTF-8") from None
@@ -94,7 +94,7 @@ class Source:
             mujoco.mj_setCacheCapacity(cache, capacity)
         lines += [str(warning.message) for warning in caught]
         self.warnings = tuple(dict.fromkeys(" ".join(line.split()) for line in lines))
-        if self._spec.compiler.fusestatic and is_from_geoms(spec):
+        if stated.compiler.fusestatic and is_from_geoms(spec):
             fused = spec.copy()
             fused.compiler.fusestatic = True
             if not np.isclose(moving_mass(compiled(fused)), moving_mass(self.model)):
@@ -116,7 +116,7 @@ class Source:
         try:
             self.model = compiled(spec)
         except ValueError as error:
-            if not is_unread(error):
+            if not any(words in str(error) for words in UNREAD):
                 raise
             files = [asset for asset in (*stated.meshes, *stated.hfields) if not is_read(stated, asset)]
             self.missing = tuple(asset.file for asset in files)
@@ -132,68 +132,66 @@ class Source:
         return "the model" if self.origin is None else "the text"
 
     def __getstate__(self) -> dict[str, Any]:
-        return self.__dict__ | {"_spec": None, "_bare": None}
+        return {name: value for name, value in self.__dict__.items() if name not in ("spec", "bare")}
 
     @property
     def mesh_geoms(self) -> list[tuple[str, list[bool]]]:
-        """Of each body but the world its name, and whether its geoms are meshes, by their class too; of a URDF nothing."""
+        """The name of each body but the world, and whether its geoms are meshes; of a URDF nothing."""
         bodies, mesh = list(self.spec.bodies)[1:] if self.spec else [], mujoco.mjtGeom.mjGEOM_MESH
         return [(body.name, [geom.type == mesh for geom in body.geoms]) for body in bodies]
 
-    @property
+    @cached_property
     def spec(self) -> mujoco.MjSpec | None:
         """What is stated: only copies of it are compiled. None: the model was compiled elsewhere."""
-        if self._spec is None and self.origin is not None:  # in another process
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the first reading has them
-                self._spec = parsed(self.origin, self.text, self.floating)
-                leave_out(self._spec, self.missing)
-        return self._spec
+        if self.origin is None:
+            return None
+        with warnings.catch_warnings(action="ignore"):  # in another process: the first reading has them
+            spec = parsed(self.origin, self.text, self.floating)
+            leave_out(spec, self.missing)
+        return spec
 
-    @property
-    def bare_spec(self) -> mujoco.MjSpec:
-        """A copy of what is stated, without what is only drawn, and without meshes, if they have no mass."""
+    @cached_property
+    def bare(self) -> mujoco.MjSpec:
+        """What is stated without what is only drawn, and without meshes, if they have no mass: copies are changed."""
         assert self.spec is not None
-        if self._bare is None:
-            self._bare = without_visuals(self.spec)
-            if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
-                delete_meshes(self._bare)
-        return self._bare.copy()
+        bare = without_visuals(self.spec)
+        if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
+            locked.delete_meshes(bare)
+        return bare
 
     def joined(self) -> "Source":
         """The same, with the mass of bodies that are welded to a moving one in that one."""
         other = copy(self)
-        other._spec = self._spec  # which is not pickled, nor copied
-        other.model, other.welded = mujoco.MjModel.__copy__(self.model), welded_bodies(self.model)
-        join(other.model, other.welded)
+        other.spec = self.spec  # which is not pickled, nor copied
+        other.model, other.welded = mujoco.MjModel.__copy__(self.model), locked.welded_bodies(self.model)
+        locked.join(other.model, other.welded)
         return other
 
     def without_meshes(self) -> mujoco.MjModel:
-        """The compiled model for what touches nothing: meshes are nearly all of its memory, and every copy copies them."""
+        """The compiled model for what touches nothing: meshes are nearly all of its memory."""
         if not (self.model.nmesh or self.model.nhfield) or self.spec is None:
             return self.model
-        model = compiled(self.bare_spec)
-        join(model, self.welded)
+        model = compiled(self.bare.copy())
+        locked.join(model, self.welded)
         return model
 
     def without(self, positions: Positions, bare: bool = False) -> mujoco.MjModel:
         """The compiled model without the joints named in `positions`, see names.joint_places.
 
-        Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a locked
-        joint; bare: all tendons, equalities and meshes, and all actuators except those with armature.
+        Every body keeps its number. Keyframes and sensors are deleted, and the actuators and equalities of a
+        locked joint; bare: all tendons, equalities and meshes, and all actuators except those with armature.
         ModelError if anything else refers to a locked joint, or nothing is stated.
         """
         names = ", ".join(positions)
         if self.spec is None:
             raise ModelError(f"cannot lock {names}: the model was changed after it was read")
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the compiler's, of the file as it is
-                spec = self.bare_spec if bare else without_visuals(self.spec)
-                model = compiled_without(spec, positions, bare)
+            with warnings.catch_warnings(action="ignore"):  # the compiler's, of the file as it is
+                spec = self.bare.copy() if bare else without_visuals(self.spec)
+                model = locked.compiled_without(spec, positions, bare)
         except ValueError as error:
             raise ModelError(f"MuJoCo cannot compile {self} with locked joints {names}: {error}") from None
-        join(model, self.welded)
+        locked.join(model, self.welded)
         return model
 
 
@@ -212,7 +210,7 @@ def is_urdf(text: str) -> bool:
 
 
 def parsed(origin: Path | str, text: str, floating: bool = False) -> mujoco.MjSpec:
-    """The MjSpec of a file (a Path) with this text, or of the text alone; floating: the base of a URDF is free."""
+    """The MjSpec of a file (a Path) with this text, or of the text; floating: the base of a URDF is free."""
     spec = parsed_file(origin, text) if isinstance(origin, Path) else mujoco.MjSpec.from_string(text)
     if floating and not is_urdf(text):
         raise ValueError("only the base of a URDF is made floating; MJCF states its free joints")
@@ -241,46 +239,27 @@ def parsed_file(path: Path, text: str) -> mujoco.MjSpec:
 
 
 def place_of(address: str, path: Path) -> Path | None:
-    """The file of package://NAME/... in a folder NAME beside a URDF or above it, else beside the URDF; None: neither."""
+    """The file of package://NAME/... in a folder NAME beside a URDF or above it, else beside the URDF."""
     _, _, relative = address.partition("://")
     places = [*(above / relative for above in path.parents), path.parent / Path(relative).name]
     return next((place for place in places if place.is_file()), None)
 
 
-def is_unread(error: ValueError) -> bool:
-    return any(words in str(error) for words in UNREAD)
-
-
 def is_read(spec: mujoco.MjSpec, asset: mujoco.MjsMesh | mujoco.MjsHField) -> bool:
-    """Whether MuJoCo can read the file of an asset, which is tried alone."""
-    alone = mujoco.MjSpec()
-    alone.modelfiledir, alone.meshdir = spec.modelfiledir, spec.meshdir
-    if isinstance(asset, mujoco.MjsMesh):
-        alone.add_mesh(name="asset", file=asset.file)
-        alone.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="asset")
-    else:
-        alone.add_hfield(name="asset", file=asset.file, size=asset.size)
-    try:
-        alone.compile()
-    except ValueError as error:
-        return not is_unread(error)
-    return True
+    """Whether the file of an asset is there, in a format that MuJoCo decodes."""
+    file = Path(spec.modelfiledir, spec.meshdir, asset.file)
+    return file.is_file() and (isinstance(asset, mujoco.MjsHField) or file.suffix.lower() in DECODED)
 
 
 def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
-    """Delete meshes and height fields by their files, and geoms of them. ValueError where one has an inertia."""
+    """Delete meshes and height fields by their files, and geoms. ValueError where one has an inertia."""
     assets = [asset for asset in (*spec.meshes, *spec.hfields) if asset.file in missing and asset.file]
     names = {asset.name: asset.file for asset in assets}
     geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]
-    for geom in geoms:
-        if gives_inertia(geom):
-            body, file = geom.parent, names.get(geom.meshname or geom.hfieldname, "")
-            why = f"is that of its mesh {file}, which cannot be read"
-            raise ValueError(f"the inertia of body {body.name!r} {why}")
-    deleted = {geom.name for geom in geoms} - {""}
-    pairs = [pair for pair in spec.pairs if {pair.geomname1, pair.geomname2} & deleted]
-    for element in (*pairs, *geoms, *assets):
-        spec.delete(element)
+    for geom in filter(gives_inertia, geoms):
+        why = f"is that of its mesh {names[geom.meshname or geom.hfieldname]}, which cannot be read"
+        raise ValueError(f"the inertia of body {geom.parent.name!r} {why}")
+    locked.delete_geoms(spec, geoms)
 
 
 def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
@@ -291,7 +270,18 @@ def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
     spec = stated.copy()
     spec.compiler.fusestatic = False  # fused bodies would only be renumbered
     spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or is_from_geoms(spec))
+    delete_textures(spec)
     return spec
+
+
+def delete_textures(spec: mujoco.MjSpec) -> int:
+    """Delete all textures, which are large in each copy of a model; how many there were."""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    textures = list(spec.textures)
+    for texture in textures:
+        spec.delete(texture)
+    return len(textures)
 
 
 def is_from_geoms(spec: mujoco.MjSpec) -> bool:

@@ -1,6 +1,7 @@
-"""One step of a compiled model with everything on: where it leads from a state, its derivative, and runs of it.
+"""One step of a model with everything on: where it leads from a state, its derivative, and runs of it.
 
-A deviation of a state is a movement of the positions (nv,), the speeds (nv,) and the activations (na,), in this order.
+A deviation of a state is a movement of the positions (nv,), the speeds (nv,) and the activations (na,), in
+this order.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +16,8 @@ from .names import INTEGRATORS, bit, element_name, number_of_actuators, output_o
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
+# what delays and yielding springs remember
+REMEMBERED = sum(int(getattr(mujoco.mjtState, f"mjSTATE_{part}", 0)) for part in ("HISTORY", "PLASTIC"))
 TOLERANCE, ITERATIONS, LINE_SEARCH = 1e-15, 200, 100  # of MuJoCo's solver: the force of constraints, exactly
 NUDGE = 1e-7  # rad, m and their rates: of central differences
 LITTLE = 1e-6  # of an activation at the start of a run that is pushed
@@ -26,11 +29,16 @@ Act = Callable[[int], None]  # before a step of a run, by its number
 copies: WeakKeyDictionary[mujoco.MjModel, mujoco.MjModel] = WeakKeyDictionary()
 
 
+def takes_transition(model: mujoco.MjModel, integrator: str) -> bool:
+    """Whether mjd_transitionFD is right: it refuses RK4 and delays, and where springs yield it leaves what has yielded."""
+    return integrator != "RK4" and not mujoco.mj_stateSize(model, REMEMBERED)
+
+
 class Step:
     """A step of a model of dt, s, by an integrator's name.
 
-    exact: the solver's tolerance is that of rounding; else the file's own settings. The steps of a model share a copy of it, as
-    meshes are large: `put` sets the options.
+    exact: the solver's tolerance is that of rounding; else the file's own settings. The steps of a model
+    share a copy of it, as meshes are large: `put` sets the options.
     """
 
     def __init__(self, model: mujoco.MjModel, dt: float, integrator: str, exact: bool = True) -> None:
@@ -69,7 +77,7 @@ class Step:
         return self.state()
 
     def after(self, state: np.ndarray, by: np.ndarray | None = None) -> np.ndarray:
-        """How far one step leads from a state that is moved by a deviation, measured from the state itself."""
+        """How far a step leads from a state that is moved by a deviation, from the state itself."""
         m, d = self.model, self.data
         self.put(state)
         start, speed, activation = d.qpos.copy(), d.qvel.copy(), d.act.copy()
@@ -88,10 +96,12 @@ class Step:
     def derivative(self, state: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
         """The derivative of a step by the deviation of the state, (n, n), by differences to the two `sides`.
 
-        MuJoCo's mjd_transitionFD is the same and faster, but has neither RK4 nor the ends of a range of activations.
+        MuJoCo's mjd_transitionFD is the same and faster, but does not have the ends of a range of
+        activations.
         """
         sides, columns = self.sides(state, nudge), list[np.ndarray]()
-        if self.integrator != "RK4" and all(ahead.any() and behind.any() for ahead, behind in sides):
+        is_taken = takes_transition(self.model, self.integrator)
+        if is_taken and all(ahead.any() and behind.any() for ahead, behind in sides):
             A = np.zeros((self.size, self.size))
             self.put(state)
             mujoco.mjd_transitionFD(self.model, self.data, nudge, True, A, None, None, None)
@@ -102,7 +112,7 @@ class Step:
         return np.array(columns).T
 
     def sides(self, state: np.ndarray, nudge: float) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The two deviations of each difference, (n,): to both sides, of an activation at the end of its range to one.
+        """The two deviations of each difference, (n,): to one side of an activation at the end of its range.
 
         A muscle's activation is never below 0, where its time constant is another one.
         """
@@ -115,7 +125,7 @@ class Step:
         return list(zip(ahead, behind))
 
     def touching(self, state: np.ndarray, by: np.ndarray) -> set[str]:
-        """The pairs of geoms whose contacts have forces at a state that is moved, and how many contacts each has."""
+        """The pairs of geoms whose contacts have forces at a moved state, and how many contacts each has."""
         self.put(state, by)
         mujoco.mj_forward(self.model, self.data)
         contacts = self.data.contact
@@ -128,29 +138,22 @@ class Step:
         mujoco.mj_fwdPosition(self.model, self.data)
         return self.data.actuator_length.copy()
 
-    def commands(
-        self, servos: Sequence[Servo], state: np.ndarray, by: np.ndarray | None = None
-    ) -> np.ndarray:
-        """What a program computes for its servos from the lengths and speeds of a state that is moved, (k,)."""
-        self.put(state, by)
-        return self.commands_now(servos)
-
-    def commands_now(self, servos: Sequence[Servo]) -> np.ndarray:
+    def commands(self, servos: Sequence[Servo]) -> np.ndarray:
+        """What a program computes for its servos from the lengths and speeds of the data, (k,)."""
         length = self.lengths()
         mujoco.mj_fwdVelocity(self.model, self.data)
         speed = self.data.actuator_velocity
         return np.array([servo.force(length[servo.output], speed[servo.output]) for servo in servos])
 
-    def by_control(self, state: np.ndarray, controls: np.ndarray, nudge: float = NUDGE) -> np.ndarray:
+    def by_control(self, state: np.ndarray, controls: np.ndarray) -> np.ndarray:
         """The derivative of a step by some of the controls, (n, k)."""
-        columns = []
-        for control in controls:
-            ends = []
-            for sign in (1.0, -1.0):
-                self.put(state)
-                self.data.ctrl[control] += sign * nudge
-                ends.append(self.after(self.state()))
-            columns.append((ends[0] - ends[1]) / (2.0 * nudge))
+
+        def pushed(control: int, by: float) -> np.ndarray:
+            self.put(state)
+            self.data.ctrl[control] += by
+            return self.after(self.state())
+
+        columns = [(pushed(k, NUDGE) - pushed(k, -NUDGE)) / (2.0 * NUDGE) for k in controls.tolist()]
         return np.array(columns).reshape(-1, self.size).T
 
     def run(self, state: np.ndarray, steps: int, act: Act = lambda step: None) -> Iterator[mujoco.MjData]:
@@ -172,14 +175,14 @@ class Step:
 
         def act(step: int) -> None:
             if step % period == 0:
-                read.append(self.commands_now(servos))
+                read.append(self.commands(servos))
             if step >= delay:
                 self.data.ctrl[places] = read[(step - delay) // period]
 
         return self.run(state, steps, act)
 
     def relaxed(self, state: np.ndarray, seconds: float, rate: float, still: float) -> np.ndarray:
-        """Where a run leads whose speeds decay at a rate, 1/s, more; it ends when nothing moves faster than `still`."""
+        """Where a run leads whose speeds decay at a rate, 1/s, until nothing moves faster than `still`."""
         end = state
         for data in self.run(state, round(seconds / self.dt)):
             data.qvel *= 1.0 - rate * self.dt
@@ -223,14 +226,10 @@ def whole_run(
 
 
 def start_of(
-    model: mujoco.MjModel,
-    drive: Drive,
-    key: str,
-    push: np.ndarray,
-    q: np.ndarray | None = None,
+    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None,
     controls: Sequence[float | None] = (),
-) -> np.ndarray:
-    """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) rad/s and m/s added to its speeds.
+) -> np.ndarray:  # fmt: skip
+    """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) added to its speeds.
 
     q: other positions, (nq,), at rest. controls: u of each actuator, None: as it is.
     Where no controls are stated the targets of servos are the posture; activations

@@ -4,18 +4,26 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...robots.actuators import Actuator
 from .actuators import actuator, is_affine
 from .names import bit, control_of, kind_of, number_of_actuators, output_of
 
 
-def copied(model: mujoco.MjModel) -> mujoco.MjModel:
-    return mujoco.MjModel.__copy__(model)
+def varied(model: mujoco.MjModel, **numbers: ArrayLike) -> mujoco.MjModel:
+    """A copy of a model with other numbers, by the fields of the model or of its options."""
+    variant = mujoco.MjModel.__copy__(model)
+    for name, values in numbers.items():
+        if hasattr(variant.opt, name):
+            setattr(variant.opt, name, values)
+        else:
+            getattr(variant, name)[:] = values
+    return variant
 
 
 def has_free_base(model: mujoco.MjModel) -> bool:
-    """Whether a base would fall: it has a free joint, or slides along gravity on a joint that nothing drives or stops."""
+    """Whether a base would fall: by a free joint, or a slide along gravity that nothing drives or stops."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = np.abs(data.xaxis @ model.opt.gravity) > 0.1 * np.linalg.norm(model.opt.gravity)
@@ -27,7 +35,7 @@ def has_free_base(model: mujoco.MjModel) -> bool:
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
-    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base, not what it holds."""
+    """Which speeds are those of the free joint that carries most mass, (nv,): the robot's base."""
     free = [joint for joint in range(model.njnt) if kind_of(model, joint) == "free"]
     carried = [float(model.body_subtreemass[model.jnt_bodyid[joint]]) for joint in free]
     base = free[int(np.argmax(carried))] if free else -1
@@ -36,11 +44,8 @@ def of_base(model: mujoco.MjModel) -> np.ndarray:
 
 def in_the_air(model: mujoco.MjModel) -> mujoco.MjModel:
     """Without contacts; with a free joint also without gravity, as it would fall."""
-    air = copied(model)
-    air.opt.disableflags |= bit("CONTACT")
-    if has_free_base(model):
-        air.opt.gravity[:] = 0.0
-    return air
+    gravity = np.zeros(3) if has_free_base(model) else model.opt.gravity
+    return varied(model, disableflags=model.opt.disableflags | bit("CONTACT"), gravity=gravity)
 
 
 def without_dry_friction(model: mujoco.MjModel) -> mujoco.MjModel | None:
@@ -48,10 +53,7 @@ def without_dry_friction(model: mujoco.MjModel) -> mujoco.MjModel | None:
     has_friction = model.dof_frictionloss.any() or model.tendon_frictionloss.any()
     if model.opt.disableflags & bit("FRICTIONLOSS") or not has_friction:
         return None
-    smooth = copied(model)
-    smooth.dof_frictionloss[:] = 0.0
-    smooth.tendon_frictionloss[:] = 0.0
-    return smooth
+    return varied(model, dof_frictionloss=0.0, tendon_frictionloss=0.0)
 
 
 def add_armature(model: mujoco.MjModel, more: np.ndarray) -> None:
@@ -85,10 +87,11 @@ def held_servos(
 ) -> tuple[mujoco.MjModel, list[Servo]]:
     """The model with motors in place of its servos, and the laws by which a program commands them.
 
-    Position and velocity servos keep their gains. With kp, kv the other actuators of constant gain follow
-    kp (target - length) - kv speed in units of their force. controls: of the file, (nu,); targets: of each output.
+    Position and velocity servos keep their gains. With kp, kv the other actuators of constant gain follow kp
+    (target - length) - kv speed in units of their force. controls: of the file, (nu,); targets: of each
+    output.
     """
-    motors, servos = copied(model), []
+    motors, servos = varied(model), []
     for i in range(number_of_actuators(model)):
         law, output = actuator(model, i), output_of(model, i)
         place, inputs = control_of(model, i)
@@ -107,8 +110,8 @@ def held_servos(
 
 
 def with_servos(model: mujoco.MjModel, kp: float, kv: float, targets: np.ndarray) -> mujoco.MjModel:
-    """The model whose motors are servos of MuJoCo with these gains: where it rests, a program's servos rest."""
-    servos = copied(model)
+    """The model whose motors are servos with these gains: where it rests, a program's servos rest."""
+    servos = varied(model)
     for i in np.flatnonzero(model.actuator_biastype == mujoco.mjtBias.mjBIAS_NONE).tolist():
         set_law(servos, i, (0.0, 0.0, 0.0), servo_bias(kp, kv, targets[output_of(model, i)]))
     return servos
@@ -132,15 +135,14 @@ def with_kv(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
     """With the speed gain kv of every servo, and its part of the gain, times a factor."""
     if not (model.actuator_biasprm[:, 2].any() or model.actuator_gainprm[:, 2].any()):
         return None
-    changed = copied(model)
-    affine = np.flatnonzero(model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE)
-    changed.actuator_biasprm[affine, 2] *= factor
-    return changed
+    bias = model.actuator_biasprm.copy()
+    bias[model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE, 2] *= factor
+    return varied(model, actuator_biasprm=bias)
 
 
 def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
     """With armature of a factor times the least inertia of each joint at qpos0 more; none of a free joint."""
-    changed = copied(model)
+    changed = varied(model)
     least = 1.0 / np.maximum(model.dof_invweight0, mujoco.mjMINVAL)
     is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
     add_armature(changed, np.where(is_free, 0.0, factor * least))
@@ -148,23 +150,19 @@ def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
 
 
 def with_slower_contacts(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
-    """With the time constant of every contact times a factor; None: they are stated by stiffness and damping."""
+    """With the time constants of contacts times a factor; None: they are stated by stiffness and damping."""
     if (model.geom_solref[:, 0] <= 0.0).all() and (model.pair_solref[:, 0] <= 0.0).all():
         return None
-    changed = copied(model)
-    for solref in (changed.geom_solref, changed.pair_solref):
+    numbers = {"geom_solref": model.geom_solref.copy(), "pair_solref": model.pair_solref.copy()}
+    for solref in numbers.values():
         solref[:, 0] *= np.where(solref[:, 0] > 0.0, factor, 1.0)
-    return changed
+    return varied(model, **numbers)
 
 
 def with_impratio(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
-    changed = copied(model)
-    changed.opt.impratio *= factor
-    return changed
+    return varied(model, impratio=factor * model.opt.impratio)
 
 
 def with_other_cone(model: mujoco.MjModel, _: float) -> mujoco.MjModel:
     """With elliptic friction cones for pyramidal ones, or the other way."""
-    changed = copied(model)
-    changed.opt.cone = 1 - model.opt.cone
-    return changed
+    return varied(model, cone=1 - model.opt.cone)

@@ -44,7 +44,14 @@ class Unread(EngineError):
 
 
 class OtherJoints(EngineError):
-    """An engine has read other joints than the file has."""
+    """An engine has read other joints than the file has; its arguments: their number of speeds, and that of the file."""
+
+    @property
+    def speeds(self) -> int:
+        return int(self.args[0])
+
+    def __str__(self) -> str:
+        return "{} of {} speeds".format(*self.args)
 
 
 class OtherNames(EngineError):

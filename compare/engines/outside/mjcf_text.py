@@ -27,7 +27,7 @@ def original_or_copy(path: Path, read: Callable[[Path], Model]) -> Copied[Model]
     """
     try:
         return read(path), path, None
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         if path.suffix == ".urdf":
             raise
         is_known = isinstance(error, OtherJoints | OtherNames)
@@ -50,7 +50,11 @@ def whole_text(path: Path) -> str:
     for keyframe in root.findall("keyframe"):
         root.remove(keyframe)
     root.attrib.setdefault("model", "robot")
-    bodies = [body for world in root.findall("worldbody") for body in world.iter("body")]
+    world, *others = root.findall("worldbody")
+    for other in others:  # of files that were included; Pinocchio reads the first as often as there are
+        world.extend(other)
+        root.remove(other)
+    bodies = list(world.iter("body"))
     if root.find(".//mesh") is not None:
         take_meshes_away(bodies, path)
     for parent in list(root.iter()):

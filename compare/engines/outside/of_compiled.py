@@ -12,7 +12,7 @@ import numpy as np
 from ...robots.actuators import Controller
 from .. import GRID, Array, Course
 from .bodies import Numbers
-from .file import File, Unread
+from .file import EngineError, File, Unread
 from .model import FROM_COMPILED, ReadModel
 from .order import Order
 
@@ -32,6 +32,7 @@ class OfCompiled(ReadModel):
 
     def __init__(self, file: File, precision: str):
         self.file, self.precision = file, precision
+        self.missing: dict[str, str] = {}  # why a method has no model of the file
         self.controllers: dict[tuple[float | None, ...], Controller] = {}
         # by MuJoCo's names: indices, and the values that are set there
         self.fields_set: dict[str, tuple[Array, Array]] = {}
@@ -52,16 +53,22 @@ class OfCompiled(ReadModel):
 
         source = Source(self.file.path, self.file.floating)
         bare = Bare(source, self.file.names, self.rotors_in_joints, controller)
+        bare.model.opt.noslip_iterations = 0  # of contacts, which are off: MuJoCo Warp's discrete has none
         for name, (index, values) in self.fields_set.items():
             attrgetter(name)(bare.model)[index] = values
         return bare
 
     def made_models(self, bare: Bare) -> dict[str, Any]:
-        """The engine's models of it by the names of methods; Unread if it does not have what that needs."""
-        try:
-            return {name: self.put_model(bare.with_integrator(name)) for name in self.methods}
-        except NotImplementedError as error:
-            raise Unread(f"it does not have what it needs: {error}") from None
+        """The engine's models of it by the names of methods that have all that it needs; Unread if none has."""
+        models: dict[str, Any] = {}
+        for name in self.methods:
+            try:
+                models[name] = self.put_model(bare.with_integrator(name))
+            except NotImplementedError as error:
+                self.missing[name] = f"it does not have what it needs: {error}"
+        if not models:
+            raise Unread(next(iter(self.missing.values())))
+        return models
 
     @abstractmethod
     def put_model(self, model: Any) -> Any:
@@ -78,6 +85,8 @@ class OfCompiled(ReadModel):
 
     def of_course(self, course: Course) -> tuple[Bare, Any, Array]:
         """The models that a course needs: MuJoCo's, the engine's; and the torque that is applied beside its actuators, (nv,)."""
+        if course.method in self.missing:
+            raise EngineError(self.missing[course.method])
         if course.servos is None:
             return self.bare, self.models[course.method], course.tau
         controller = course.servos.controller

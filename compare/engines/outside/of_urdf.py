@@ -54,8 +54,10 @@ class OfUrdf(SteppedModel):
         if name == "gravity":
             self.set_gravity(values)
             return True
+        if values[self.order.is_of_free()].any():
+            raise Unwritten(f"free joints have no {name}")
         self.read[name] = np.array(values)
-        return not values[self.order.is_of_free()].any()
+        return True
 
     def armature_matrix(self) -> Array:
         """In the engine's order."""

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike
 
 import tmt
 from tmt.derivation import method
-from tmt.model.values import shown
 
 from ...process.interrupt import is_interrupt
 from ...robots.coordinates import Coordinates
@@ -38,11 +37,13 @@ class OwnEquations:
     """
 
     def __init__(
-        self, source: object, coordinates: Coordinates, joints: JointMap | None = None, tree: tmt.Tree | None = None,
-        required: Sequence[str] = ("mass_matrix", "bias"),
+        self, source: object, coordinates: Coordinates, joints: JointMap | None = None,
+        tree: tmt.Tree | None = None, required: Sequence[str] = ("mass_matrix", "bias"),
     ):  # fmt: skip
         self.coordinates, self.tree = coordinates, tree
         self.functions = functions.functions_of(source, coordinates, required)
+        if pair := self.functions.get("jacobians"):  # T and B, in one array
+            self.functions["jacobians"] = lambda q: np.stack(pair(q), axis=-4)
         try:
             self.joints = joints or joint_map(coordinates, functions.names_of(source))
         except JointsError as error:
@@ -187,8 +188,7 @@ class OwnEquations:
         self.times[name] = min(times), min(times)
         if len(singles) == count:
             started = time.perf_counter()
-            with suppress(OwnError), warnings.catch_warnings(), np.errstate(all="ignore"):
-                warnings.simplefilter("ignore")
+            with suppress(OwnError), warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
                 together = self.called(name, [part[:count] for part in states], count, is_trial=True)
                 if functions.same(together, np.array(singles)):
                     self.takes_batches[name] = True
@@ -212,13 +212,7 @@ class OwnEquations:
                 changed = np.any(np.atleast_2d(before != after), axis=1)
                 self.note(name, f"changes its argument {symbol}", list(map(np.atleast_2d, states)), changed)
         shape = self.shapes[name] if count is None else (count, *self.shapes[name])
-        if name != "jacobians":
-            return functions.converted(name, value, shape)
-        of_part = (*shape[:-4], *shape[-3:])
-        if not isinstance(value, tuple | list | ndarray) or len(value) != 2:
-            wanted = f"two arrays, T and B, of shape (bodies, 3, {shape[-1]})"
-            raise OwnError(f"jacobians is {shown(value)}; expected {wanted}")
-        return np.stack([functions.converted(name, part, of_part) for part in value], axis=-4)
+        return functions.converted(name, value, shape)
 
     def note(self, name: str, what: str, states: States, where: ndarray) -> None:
         """Add an error at those of the states (states, n), in the user's joints, where it occurred."""

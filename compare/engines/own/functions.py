@@ -85,11 +85,9 @@ def of_inverse_dynamics(forces: Function, coordinates: Coordinates) -> dict[str,
 
     def mass_matrix(q: np.ndarray) -> np.ndarray:
         still = np.zeros((*np.shape(q)[:-1], coordinates.nv))
-        at_rest = np.asarray(forces(q, still, still), float)
-        columns = [
-            np.asarray(forces(q, still, still + row), float) - at_rest
-            for row in PUSH * np.eye(coordinates.nv)
-        ]
+        pushes = [still, *(still + row for row in PUSH * np.eye(coordinates.nv))]
+        at_rest, *pushed = (np.asarray(forces(q, still, push), float) for push in pushes)
+        columns = [values - at_rest for values in pushed]
         return np.stack([column.reshape(still.shape) for column in columns], axis=-1) / PUSH
 
     return {"mass_matrix": mass_matrix, "bias": bias}

@@ -62,7 +62,7 @@ def begin(setup: Setup) -> Work:
 
 
 def integrator_of(setup: Setup, subject: Subject) -> str:
-    """The integrator of the robot's model, of which a step's derivatives are advised; implicitfast where it is not compared."""
+    """The model's integrator, for whose steps an eps is advised; implicitfast where it is not compared."""
     model = cast(Mujoco, setup.engines["mujoco"]).model
     compared = [name for name in INTEGRATORS if name in methods_for(subject.tree)]
     same = (name for name in compared if MEMBERS[name] == model.opt.integrator)
@@ -90,7 +90,10 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     integrator = integrator_of(setup, main[0].subject)
     add_advice(result, scenes, hard, integrator, in_air)
     if setup.alone and in_air:
-        add_contacts(setup, result)
+        setup.progress("derivatives: contacts")
+        if setup.reading and (rows := contact_rows(setup.reading)):
+            result.tables["contact_derivatives"] = rows
+            result.top.append(result.finding("contacts", rows=rows))
     return result
 
 
@@ -107,9 +110,8 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
         calls[quantity.name, ways.NUMPY] = partial(quantity.by_numpy, first, dt)
         if ways.COMPILED in measured.shares:
             state = [values[0] for values in quantity.arguments(subject, dt)]
-            calls[quantity.name, ways.COMPILED] = partial(
-                Evaluator(subject.tree, quantity.function).of_one, *state
-            )
+            evaluator = Evaluator(subject.tree, quantity.function)
+            calls[quantity.name, ways.COMPILED] = partial(evaluator.of_one, *state)
     result.times = timing.fastest(calls, setup.of(50, 20, 2))
 
 
@@ -118,7 +120,10 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
     subject, quantity = forward.subject, forward.quantity
     for name, engine in setup.engines.items():
         dynamics = None if engine.unavailable() else engine.of(subject.case)
-        if not (isinstance(dynamics, OutsideDynamics) and has_derivatives(dynamics)):
+        try:
+            if not isinstance(dynamics, OutsideDynamics) or not dynamics.has("derivatives"):
+                continue
+        except EngineError:  # it cannot read the file: the experiment `engines` says why
             continue
         setup.progress(f"derivatives: {LABELS[name]}")
         values = ways.side_by_side(dynamics.derivatives(subject.q, subject.qd, subject.tau))
@@ -132,22 +137,6 @@ def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> N
         result.rows.append(row)
         state = subject.q[0], subject.qd[0], subject.tau[0]
         result.times[quantity.name, LABELS[name]] = dynamics.seconds_of_derivatives(*state)
-
-
-def has_derivatives(dynamics: OutsideDynamics) -> bool:
-    """Whether an engine reads the file and has derivatives; the experiment `engines` says why not."""
-    try:
-        return dynamics.has("derivatives")
-    except EngineError:
-        return False
-
-
-def add_contacts(setup: Setup, result: DerivativesResult) -> None:
-    """What differences are worth where a robot of a file stands on its contacts."""
-    setup.progress("derivatives: contacts")
-    if setup.reading and (rows := contact_rows(setup.reading)):
-        result.tables["contact_derivatives"] = rows
-        result.top.append(result.finding("contacts", rows=rows))
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:
@@ -202,16 +191,15 @@ def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: 
 def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
     """MuJoCo's way to a quantity: its own function, centred where it can be."""
     others = [row for row in costs if row.quantity == quantity and row.way not in EXACT]
-    return max(
-        others, key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")), default=None
-    )
+    others.sort(key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")))
+    return others[-1] if others else None
 
 
 def add_advice(
     result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured], integrator: str,
     in_air: bool,
 ) -> None:  # fmt: skip
-    """Which eps to use, by MuJoCo's own function where it takes the integrator; where that fails. in_air: no contacts."""
+    """Which eps to use, by MuJoCo's function where it takes the integrator; where that fails."""
     by_eps = [row for row in scenes if row.eps]
     step = [row for row in by_eps if row.quantity == ways.step_name(integrator)]
     inverse = [row for row in by_eps if row.quantity == ways.INVERSE]
@@ -238,15 +226,13 @@ def add_advice(
         if measured.quantity.name != FORWARD:
             name = measured.quantity.name
             at_scenes = ways.best_of(tried(by_eps, name))
-            rows_here = tried([row for row in measured.rows if row.eps], name)
-            pairs.append(
-                {"row": ways.worst_of_each_eps(rows_here)[at_scenes.eps or 0.0], "scenes": at_scenes}
-            )
+            rows_here = ways.worst_of_each_eps(tried([row for row in measured.rows if row.eps], name))
+            pairs.append({"row": rows_here[at_scenes.eps or 0.0], "scenes": at_scenes})
     result.find("hard", pairs=pairs)
 
 
 def tried(rows: Sequence[DerivativeRow], quantity: str) -> list[DerivativeRow]:
-    """The rows of a quantity by MuJoCo's own function, of steps centred; by differences of mj_step where there is none."""
+    """The rows of a quantity by MuJoCo's function, centred; by differences of mj_step where there is none."""
     same = [row for row in rows if row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)]
     by_function = [row for row in same if not row.way.startswith(ways.BY_STEPS)]
     return by_function or same

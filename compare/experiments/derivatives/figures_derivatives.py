@@ -21,19 +21,20 @@ def draw_errors(result: DerivativesResult) -> tuple[str, Figure, Finding]:
     ax = fig.subplots()
     ways = dict.fromkeys(row.way for row in rows if row.eps)
     for way, colour, dash, marker in zip(ways, COLOURS, DASHES, MARKERS):
-        errors = {
-            eps: row.size for eps, row in worst_of_each_eps(row for row in rows if row.way == way).items()
-        }
+        worst = worst_of_each_eps(row for row in rows if row.way == way)
         look = {"color": colour, "linestyle": dash, "marker": marker, "markersize": 4}
-        ax.plot(list(errors), list(errors.values()), label=way, **look)
+        ax.plot(list(worst), [row.size for row in worst.values()], label=way, **look)
     drawn = {(row.subject, row.quantity) for row in rows}
-    exact = best_of(
-        row for row in result.rows if row.way in EXACT and (row.subject, row.quantity) in drawn
-    ).size
-    ax.axhline(max(exact, LEAST), color=GREY, linestyle=":", linewidth=1.5, label="tmt's exact derivatives")
-    ax.set(
-        **LOGARITHMIC, xlabel="eps of the difference, rad, m, rad/s, m/s, N m or N", ylabel="relative error"
+    exact = [row for row in result.rows if row.way in EXACT and (row.subject, row.quantity) in drawn]
+    ax.axhline(
+        max(best_of(exact).size, LEAST),
+        color=GREY,
+        linestyle=":",
+        linewidth=1.5,
+        label="tmt's exact derivatives",
     )
+    units = "rad, m, rad/s, m/s, N m or N"
+    ax.set(**LOGARITHMIC, xlabel=f"eps of the difference, {units}", ylabel="relative error")
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
     states = {row.subject: row.states for row in rows}
     caption = result.finding("errors_caption", states=states, integrator=result.integrator)
@@ -48,12 +49,8 @@ def draw_times(result: DerivativesResult) -> tuple[str, Figure, Finding]:
     for k, way in enumerate(dict.fromkeys(row.way for row in costs)):
         points = [(max(row.error, LEAST), row.time) for row in costs
                   if row.way == way and row.time and row.error is not None]  # fmt: skip
-        fill = "none" if k >= len(COLOURS) else None
-        look: dict[str, Any] = {
-            "color": COLOURS[k % len(COLOURS)],
-            "marker": "s" if way in EXACT else "o",
-            "markerfacecolor": fill,
-        }
+        fill, marker = "none" if k >= len(COLOURS) else None, "s" if way in EXACT else "o"
+        look: dict[str, Any] = {"color": COLOURS[k % len(COLOURS)], "marker": marker, "markerfacecolor": fill}
         ax.plot(*zip(*points), linestyle="none", label=way, **look)
     ax.set(**LOGARITHMIC, xlabel="relative error (decreasing)", ylabel="time of one evaluation, us")
     ax.invert_xaxis()

@@ -37,7 +37,7 @@ class Subject(NamedTuple):
 
 
 def cases_of(robot: Robot) -> list[Case]:
-    """A damped case, one of its own servos and a free one, as far as the robot has them; regular ones first."""
+    """A damped case, one of its servos and a free one, as far as there are such; regular ones first."""
     chosen: dict[str, Case] = {}
     for case in sorted(robot.cases, key=lambda case: "regular" not in case.scene.tags):
         if case.scene.locked:
@@ -50,16 +50,15 @@ def cases_of(robot: Robot) -> list[Case]:
 def along(case: Case, states: int) -> Subject:
     """States at equal times of the motion of a case, its start not among them; fewer where it ends early."""
     scene = case.scene
-    _, q, qd = tmt.simulate(
-        *case.start, case.tau, scene.dt, scene.steps, "dopri8_adaptive", case.tree, tolerance=1e-9
-    )
+    method = "dopri8_adaptive"
+    _, q, qd = tmt.simulate(*case.start, case.tau, scene.dt, scene.steps, method, case.tree, tolerance=1e-9)
     reached = np.flatnonzero(np.isfinite(qd).all(axis=1))
     at = reached[np.linspace(0, len(reached) - 1, states + 1).astype(int)[1:]]
     return Subject(case.name, "scene", case, case.tree, q[at], qd[at], np.tile(case.tau, (len(at), 1)))
 
 
 def stiff(subject: Subject, dt: float) -> Subject:
-    """A state near the rest of springs with critical dampers, which settle in a few steps; free joints have none."""
+    """A state near the rest of critically damped springs, fast as a few steps; free joints have none."""
     tree, q, qd = subject.tree, subject.q[:1], subject.qd[:1]
     inertia = 1.0 / np.einsum("ii->i", tmt.inverse_mass_matrix(q[0], tree))
     rate, first = STIFF_RATE / dt, [joint.qd.start for joint in tree.coordinates.joints]

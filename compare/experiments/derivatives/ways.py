@@ -1,6 +1,6 @@
-"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; rows of the errors of each."""
+"""The ways to a derivative: MuJoCo's differences over their eps, tmt's exact ones; their errors."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product, repeat
@@ -20,6 +20,7 @@ from ...engines.mujoco import Mujoco
 from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
+from ...engines.mujoco.step import takes_transition
 from ...judge.agree import share_of
 from ...judge.entries import Entries
 from ...judge.rounding import LEFT_OUT, of_positions
@@ -140,24 +141,19 @@ class Quantity(NamedTuple):
         scale = entries.derivatives(subject.tau, qdd, by)
         return entries.step(dt, by, scale) if self.integrator else np.concatenate(scale[:3], axis=2)
 
-    def differences(self, dynamics: MujocoDynamics, subject: Subject, dt: float, k: int) -> Iterator["Way"]:
+    def differences(self, dynamics: MujocoDynamics, subject: Subject, dt: float, k: int) -> list["Way"]:
         """MuJoCo's ways at state k."""
-        q, qd, tau = subject.q[k], subject.qd[k], subject.tau[k]
+        q, qd = subject.q[k], subject.qd[k]
         if self.name == INVERSE:
-            a = accelerations(subject)[k]
-            yield Way(BY_INVERSE, False, lambda eps: of_inverse(dynamics, q, qd, a, eps))
-        functions = {TRANSITION: of_transition, BY_STEPS: of_steps}
-        for (side, centred), (name, function) in product(
-            ((ONE_SIDED, False), (CENTRED, True)), functions.items()
-        ):
-            if self.integrator and not (self.integrator == "RK4" and function is of_transition):
-
-                def call(
-                    eps: float, function: Callable[..., Call] = function, centred: bool = centred
-                ) -> Call:
-                    return function(dynamics, q, qd, tau, dt, self.integrator, eps, centred)
-
-                yield Way(f"{name}, {side}", centred, call)
+            call = partial(of_inverse, dynamics, q, qd, accelerations(subject)[k])
+            return [Way(BY_INVERSE, False, call)]
+        functions, ways = {BY_STEPS: of_steps} if self.integrator else {}, []
+        if functions and takes_transition(dynamics.model, self.integrator):
+            functions = {TRANSITION: of_transition} | functions
+        for side, (name, function) in product((ONE_SIDED, CENTRED), functions.items()):
+            state = dynamics, q, qd, subject.tau[k], dt, self.integrator, side == CENTRED
+            ways.append(Way(f"{name}, {side}", side == CENTRED, partial(function, *state)))
+        return ways
 
 
 class Way(NamedTuple):
@@ -169,7 +165,7 @@ class Way(NamedTuple):
 
 
 def side_by_side(values: Array) -> Array:
-    """Matrices (states, rows, columns) as they are; of (states, parts, nv, nv) the first three beside each other."""
+    """Matrices (states, rows, columns); of (states, parts, nv, nv) the first three beside each other."""
     return values if values.ndim == 3 else np.concatenate(values[:, :3].swapaxes(0, 1), axis=2)
 
 
@@ -180,11 +176,8 @@ def step_name(integrator: str) -> str:
 def quantities(subject: Subject, integrators: Sequence[str]) -> list[Quantity]:
     """The derivatives of accelerations and torques, and of a step of each of these integrators of MuJoCo."""
     methods = methods_for(subject.tree)
-    steps = [
-        Quantity(step_name(name), f"step_derivatives:{methods[name].scheme}", STATE, name)
-        for name in integrators
-        if name in methods
-    ]
+    schemes = {name: methods[name].scheme for name in integrators if name in methods}
+    steps = [Quantity(step_name(x), f"step_derivatives:{scheme}", STATE, x) for x, scheme in schemes.items()]
     forward = Quantity(FORWARD, "derivatives", (("rad/s2", "m/s2"),))
     return [forward, Quantity(INVERSE, "inverse_dynamics_derivatives", FORCE), *steps]
 
@@ -207,10 +200,8 @@ def relative(
 
     Sizes up to `least` are zeros. The first is inf where a difference is not a number.
     """
-    size, is_finite = sizes(exact, units), np.isfinite(difference)
-    error = np.zeros(size.shape)
-    np.divide(np.abs(difference), size, out=error, where=is_finite & (size > least))
-    error[~is_finite] = np.inf
+    size = sizes(exact, units)
+    error = share_of(np.abs(difference), np.where(size > least, size, np.inf))
     at = np.unravel_index(int(error.argmax()), error.shape)
     return float(error[at]), f"{units[0][at[0]]} per {units[1][at[1]]}", float(size[at])
 
@@ -218,8 +209,9 @@ def relative(
 def sizes(exact: Array, units: tuple[Array, Array]) -> Array:
     """What each difference is relative to: the largest exact entry of its unit, (rows, columns).
 
-    A step has units of the state in its rows and columns, and a block of them may be as good as zero. They are
-    balanced: speeds are in units of the robot's own time. Then one size is that of all A, and of B for each unit.
+    A step has units of the state in its rows and columns, and a block of them may be as good as zero. They
+    are balanced: speeds are in units of the robot's own time. Then one size is that of all A, and of B for
+    each unit.
     """
     (rows, columns), size = units, np.zeros(exact.shape)
     for unit, by in product(np.unique(rows), np.unique(columns)):
@@ -294,7 +286,7 @@ def row_of(
 
 
 def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
-    """The largest share of a tolerance: of the distance from the exact values, of all or of the first columns."""
+    """The largest share of a tolerance of the distance from the exact values, of all or the first columns."""
     exact = Pairs(*(part[:, :, : values.shape[2]] for part in exact))
     return float(share_of(exact.distance(values), tolerance).max())
 
@@ -302,11 +294,12 @@ def largest_share(exact: Pairs, values: Array, tolerance: Array) -> float:
 def share_of_differences(
     values: Mapping[float, Array], exact: Pairs, subject: Subject, quantity: Quantity, dt: float
 ) -> float:
-    """The largest share, over eps and entries, of what rounding and truncation can make a centred difference off.
+    """The largest share, over eps and entries, of what rounding and truncation can do to a difference.
 
-    Rounding: 64 eps of what a step adds, there and carried through the step, over the eps of the difference; a
-    ball's turn is a quaternion, as in judge.rounding. Truncation: twice the term in eps^2, from ten and a hundred times eps.
-    Of discrete with servos at rest also the force that MuJoCo leaves out, over the eps of the difference.
+    Rounding: 64 eps of what a step adds, there and carried through the step, over the eps of the difference;
+    a ball's turn is a quaternion, as in judge.rounding. Truncation: twice the term in eps^2, from ten and a
+    hundred times eps. Of discrete with servos at rest also the force that MuJoCo leaves out, over the eps of
+    the difference.
     """
     entries, qdd = Entries(subject.tree, subject.q, subject.qd), accelerations(subject)
     force = entries.force(subject.tau) + gain_scale(subject.tree, subject.q, subject.qd)

@@ -14,21 +14,25 @@ from ...core.finding import Finding
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics
 from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unread, Unwritten
-from ...engines.outside.model import FROM_URDF
+from ...engines.outside.model import FROM_FILE, FROM_URDF
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
+from ...robots.coordinates import free_joints
 from ...robots.states import Sample
 from .. import Experiment
 from ..quantities import QUANTITIES
 from ..setup import Setup
 from . import answer, batches, integrators, servos
+from .causes import joints_lost
 from .motion import free_scene
-from .readings import compare_numbers
+from .readings import compare_numbers, file_of
 from .tables import EngineRow, EnginesResult, ReadRow
 
-EXPERIMENT = Experiment(order=65, serves_own=False, quick_speeds=0, options=("--engines",))
+EXPERIMENT = Experiment(
+    order=65, serves_own=False, quick_speeds=0, options=("--engines",), first_screen=("answer", "cheapest")
+)
 BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
 TABLES = "answer", "read", "methods", "servos", "batches"
@@ -55,7 +59,7 @@ def rows(setup: Setup) -> EnginesResult:
             else:
                 compare_engine(result, setup, engine)
         except NOT_ASKED as error:
-            add_not_asked(result, label, error)
+            add_not_asked(result, setup.robot, engine.name, error)
         except EngineError as error:
             result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
     for reason, labels in absent.items():
@@ -83,11 +87,12 @@ def add_load(result: EnginesResult) -> None:
         result.find("busy", load=load, cores=cores())
 
 
-def add_not_asked(result: EnginesResult, label: str, error: EngineError) -> None:
+def add_not_asked(result: EnginesResult, robot: Robot, engine: str, error: EngineError) -> None:
     """A row and a finding of an engine that takes no part: it refuses the file, or this program does not ask it."""
-    result.tables["engines_read"].append(ReadRow(label, why_not=str(error)))
-    reason = str(error).rstrip(".")
-    result.find("not_asked", why=type(error).__name__, engine=label, reason=reason)
+    label, reason = LABELS[engine], str(error).rstrip(".")
+    cause = joints_lost(engine, file_of(robot), error.speeds) if isinstance(error, OtherJoints) else None
+    result.tables["engines_read"].append(ReadRow(label, cause=cause and str(cause), why_not=str(error)))
+    result.find("not_asked", why=type(error).__name__, engine=label, reason=reason, cause=cause)
     if label not in [row.engine for row in result.rows]:
         result.not_asked.append(label)
 
@@ -96,14 +101,25 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     setup.progress(f"engines: {engine.record.label}{' compiles' * engine.record.compiles}")
     dynamics = engine.of(setup.robot.case())
     reading = dynamics.reading
-    compare_numbers(result, setup.robot, engine.record, reading)
+    compare_numbers(result, setup.robot, engine.name, reading)
     reads_another = bool(reading["mended"] or reading["lacking"]) and reading["way"] != FROM_URDF
     as_read = engine.as_read(setup.robot.case()) if reads_another else None
     compare_quantities(result, setup, engine.record, dynamics, as_read)
+    free = names_of_free(setup.robot)
+    are_right = all(row.passed for row in result.rows if row.engine == engine.record.label)
+    if free and reading["way"] == FROM_FILE and "armature" not in reading["mended"] and not are_right:
+        result.find("armature_of_free", engine=engine.record.label, joints=free)
     if all(reading["mended"].values()):
         integrators.compare_methods(result, setup, engine)
         servos.follow_step(result, setup, engine, reads_another)
         batches.time_batches(result, setup, engine)
+
+
+def names_of_free(robot: Robot) -> list[str]:
+    """The free joints that have armature."""
+    armature, joints = np.array(robot.tree.armature), robot.coordinates.places.joints
+    firsts = [first for first in free_joints(robot.tree) if armature[joints[first].qd.start :][:6].any()]
+    return [robot.joints[first].removesuffix(" x") for first in firsts]
 
 
 def compare_quantities(

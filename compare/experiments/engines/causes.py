@@ -1,10 +1,13 @@
-"""Why an engine has read a number differently: facts of the file that are known to be read otherwise, looked up for each number.
+"""Why an engine has read a number differently: what MuJoCo reads of the file without something that the engine leaves out.
 
-A cause is named only where the file has the fact at that joint or body, and the engine has read what follows from it. Each kind
-has a script that shows it in tests/engines/test_accusations.py.
+A cause is named where MuJoCo's number of the changed text is the engine's, and no number of that kind speaks against it.
+Rounding, and what no text states, are recognized by what was read. Each has a script in tests/engines/test_accusations.py.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from copy import deepcopy
+from functools import lru_cache
 from typing import NamedTuple
 from xml.etree import ElementTree
 
@@ -12,70 +15,71 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...core.words import some_of
+from ...engines import RECORDS, Array
+from ...engines.mujoco import read
 from ...engines.mujoco.names import joint_places
-from ...engines.mujoco.source import Source
-from ...engines.outside.file import File
-from ...engines.outside.mjcf_text import included
+from ...engines.mujoco.source import ModelError, Source
+from ...engines.outside.bodies import numbers_of, size_of
+from ...engines.outside.file import File, Unread
+from ...engines.outside.mjcf_text import whole_text
 from ...engines.outside.model import Reading
+from ...judge.scale import FACTOR
+from .losses import LOSSES, Loss, Text, taken
 
-OF_JOINTS = "armature", "damping", "stiffness", "axis"
-PLACES = "com", "com_moved", "inertia", "anchor", "anchor_moved", "axis", "axis_moved"
 MASSES = "mass", "moments", "com", "com_moved", "inertia"
-CLOSE = 1e-6  # m
-STANDARD = (0.0, 0.0, -9.81)
+PLACES = "com", "com_moved", "inertia", "anchor", "anchor_moved", "axis", "axis_moved"
+CLOSE, SINGLE = 1e-6, float(np.finfo(np.float32).eps)
+KEPT = (
+    "compiler",
+    "option",
+    "default",
+    "worldbody",
+    "actuator",
+)  # sections that numbers of bodies and joints follow from
+DRAWN = "material", "mesh", "hfield"  # attributes whose assets are left out
 
 
 class Cause(NamedTuple):
-    kind: str  # a macro of the template
-    subject: str  # joint, body, class or attribute
+    kind: str  # a case of the template's macro
+    subject: str  # joints, bodies, classes or attributes
 
     def __str__(self) -> str:
         return f"{self.kind} {self.subject}"
 
 
-class Text:
-    """An MJCF file as text: elements by their names, the classes of defaults; and its compiled model."""
+class Origin:
+    """What the numbers of a file follow from: its text, and the model that MuJoCo compiles of it."""
 
     def __init__(self, file: File) -> None:
-        source, path = Source(file.path, file.floating), file.path
-        self.model = source.model
-        self.meshed = {name for name, are_meshes in source.mesh_geoms if any(are_meshes)}  # of bodies
+        self.file = file
+        self.source = Source(file.path, file.floating)
+        self.model = self.source.model
         self.places = joint_places(self.model)
+        self.meshed = {name for name, are_meshes in self.source.mesh_geoms if any(are_meshes)}  # of bodies
         self.root = ElementTree.Element("mujoco")
-        if path.suffix != ".urdf":
-            self.root = included(ElementTree.parse(path).getroot(), path.parent)
-        outermost = next((default.get("class", "main") for default in self.root.findall("default")), "main")
-        self.classes: dict[str, tuple[ElementTree.Element, str | None]] = {}  # with the class around
-        for default in self.root.findall("default"):
-            self.add_class(default, outermost, None)
-        self.class_of: dict[str, str] = {}  # of joints, by name
-        for world in self.root.findall("worldbody"):
-            self.add_joints(world, outermost)
-        actuators = [*self.root.findall("actuator/motor"), *self.root.findall("actuator/position")]
-        self.driven = {actuator.get("joint", "") for actuator in actuators}
+        with suppress(Unread):
+            if file.path.suffix != ".urdf":
+                self.root = ElementTree.fromstring(whole_text(file.path))
+        for section in [part for part in self.root if part.tag not in KEPT]:
+            self.root.remove(section)
+        for part in list(self.root.iter()):
+            taken([part], DRAWN)
+            for shown in [child for child in part if child.tag in ("light", "camera")]:
+                part.remove(shown)
 
-    def add_class(self, default: ElementTree.Element, name: str, around: str | None) -> None:
-        self.classes[name] = default, around
-        for inner in default.findall("default"):
-            self.add_class(inner, inner.get("class", ""), name)
-
-    def add_joints(self, body: ElementTree.Element, childclass: str) -> None:
-        childclass = body.get("childclass", childclass)
-        for joint in body.findall("joint"):
-            self.class_of[joint.get("name", "")] = joint.get("class", childclass)
-        for child in body.findall("body"):
-            self.add_joints(child, childclass)
-
-    def passed_over(self, joint: str, attribute: str) -> str | None:
-        """The class without a <joint> between a joint and the class around it that states the attribute; None: there is none."""
-        name, empty = self.class_of.get(joint), None
-        while name in self.classes:
-            default, around = self.classes[name]
-            stated = default.find("joint")
-            if stated is not None and attribute in stated.attrib:
-                return empty
-            empty, name = name if stated is None else empty, around
-        return None
+    def without(self, losses: Sequence[Loss]) -> tuple[list[str], Source | None]:
+        """What the last loss changes, after the others, and the source of the changed text; None: MuJoCo makes no model of it."""
+        text, changed = Text(deepcopy(self.root)), list[str]()
+        for loss in losses:
+            changed = list(dict.fromkeys(filter(None, loss(text))))
+        joints = {joint.get("name") for joint, _ in text.parts("joint")}
+        for section in text.root.findall("actuator"):
+            for actuator in [actuator for actuator in section if actuator.get("joint") not in joints]:
+                section.remove(actuator)
+        try:
+            return changed, Source(ElementTree.tostring(text.root, encoding="unicode")) if changed else None
+        except ModelError:
+            return changed, None
 
     def carriers(self, joint: str) -> list[int]:
         """The bodies from that of a joint of the Tree to the last one before the world."""
@@ -85,170 +89,186 @@ class Text:
             body = int(self.model.body_parentid[body])
         return carriers
 
-    def turn(self, body: int) -> Rotation:
-        """From the axes of a body to those of its parent, at qpos0."""
-        return Rotation.from_quat(np.roll(self.model.body_quat[body], -1))
+    def name(self, body: int) -> str:
+        return str(self.model.body(body).name) or f"body {body}"
+
+
+@lru_cache(maxsize=4)
+def origin_of(file: File) -> Origin:
+    return Origin(file)
 
 
 class Entry(NamedTuple):
     """An entry of a number that an engine has read differently."""
 
-    text: Text
-    reading: Reading
     number: str
-    joints: Sequence[str]  # of the Tree
-    joint: int  # to whose row it belongs
-    bodies: Sequence[str]  # that move with that joint
     place: int  # in all numbers as one row
-    wrong: set[int]  # the joints of all entries of this number that differ
-
-    def values(self, number: str) -> tuple[np.ndarray, np.ndarray]:
-        """What was read, and what is stated."""
-        return self.reading["read"][number], self.reading["stated"][number]
-
-    @property
-    def name(self) -> str:
-        """Of the joint."""
-        return self.joints[self.joint]
-
-    @property
-    def is_zero(self) -> bool:
-        return not np.ravel(self.values(self.number)[0])[self.place]
-
-    @property
-    def root(self) -> int:
-        """The last body before the world, for an entry of a place; 0: none."""
-        return self.text.carriers(self.name)[-1] if self.number in PLACES else 0
-
-    @property
-    def geoms(self) -> list[ElementTree.Element]:
-        """The geoms of which the bodies have their mass, for an entry of masses."""
-        geoms: list[ElementTree.Element] = []
-        for name in self.bodies if self.number in MASSES else ():
-            body = self.text.root.find(f".//body[@name='{name}']")
-            if body is not None and body.find("inertial") is None:
-                geoms += body.findall("geom")
-        return geoms
+    joint: int  # of the Tree, to whose row it belongs
+    bodies: tuple[str, ...]  # that move with that joint
 
 
-def class_without_joint(entry: Entry) -> str | None:
-    """A class between has no <joint>, and the engine has MJCF's default: 0, and an axis along z of the body."""
-    name = entry.text.passed_over(entry.name, entry.number) if entry.number in OF_JOINTS else None
-    if name and entry.number == "axis":
-        z = np.array([0.0, 0.0, 1.0])
-        for body in entry.text.carriers(entry.name):
-            z = entry.text.turn(body).apply(z)
-        return name if np.allclose(entry.values("axis")[0][entry.joint], z, atol=CLOSE) else None
-    return name if name and entry.is_zero else None
+def causes_of(engine: str, file: File, reading: Reading, entries: Sequence[Entry]) -> dict[Entry, Cause]:
+    """The causes of entries, as far as one is known: losses, each with those that were found before, then what else is seen."""
+    origin, causes = origin_of(file), dict[Entry, Cause]()
+    if origin.root.find("worldbody") is not None:
+        explain_by_losses(engine, origin, reading, entries, causes)
+    finds = [SEEN[kind] for kind in OF_ENGINES.get(engine, ()) if kind in SEEN]
+    for entry in [entry for entry in entries if entry not in causes]:
+        subjects = {find.__name__: find(origin, reading, entry, entries) for find in finds}
+        kind = next((kind for kind, subject in subjects.items() if subject), None)
+        if kind:
+            causes[entry] = Cause(kind, str(subjects[kind]))
+    return causes
 
 
-def no_springs(entry: Entry) -> str | None:
-    """None of the springs of the joints was read."""
-    return "stiffness" if entry.number == "stiffness" and not entry.values("stiffness")[0].any() else None
+def losses_of(engine: str) -> list[str]:
+    return [kind for kind in OF_ENGINES.get(engine, ()) if kind in LOSSES]
 
 
-def armature_without_motor(entry: Entry) -> str | None:
-    """The engine has the armature of all joints that a motor or a position servo drives, and of no other."""
-    driven = {entry.joints[joint] for joint in entry.wrong} & entry.text.driven
-    unexplained = [name for name in driven if not entry.text.passed_over(name, "armature")]
-    is_lost = entry.number == "armature" and entry.is_zero and entry.name not in driven
-    return entry.name if is_lost and not unexplained else None
+def explain_by_losses(
+    engine: str, origin: Origin, reading: Reading, entries: Sequence[Entry], causes: dict[Entry, Cause]
+) -> None:
+    lost, is_new, eps = list[Loss](), True, RECORDS[engine].eps
+    known = losses_of(engine)
+    while is_new and len(causes) < len(entries):
+        is_new = False
+        for kind in known:
+            if LOSSES[kind] in lost:
+                continue
+            changed, source = origin.without([*lost, LOSSES[kind]])
+            numbers = numbers_without(origin, source)
+            fitting = [
+                entry for entry in entries if entry not in causes and fits(reading, numbers, eps, entry)
+            ]
+            if fitting:
+                causes |= dict.fromkeys(fitting, Cause(kind, some_of(changed)))
+                lost.append(LOSSES[kind])
+                is_new = True
 
 
-def option_gravity(entry: Entry) -> str | None:
-    is_gravity = entry.number == "gravity"
-    return "gravity" if is_gravity and np.allclose(entry.values("gravity")[0], STANDARD, atol=CLOSE) else None
+def numbers_without(origin: Origin, source: Source | None) -> Mapping[str, Array]:
+    """numbers_of a changed text; none if it has other joints."""
+    try:
+        tree = read(source).tree if source else None
+    except ModelError:
+        tree = None
+    if tree is None or (tree.joint_names, tree.kind) != (origin.file.names, origin.file.kinds):
+        return {}
+    return numbers_of(tree)
 
 
-def total_mass(entry: Entry) -> str | None:
-    """All masses are the same multiple of the compiled ones."""
-    if entry.number not in MASSES or entry.text.root.find("compiler[@settotalmass]") is None:
+def fits(reading: Reading, numbers: Mapping[str, Array], eps: float, entry: Entry) -> bool:
+    """Whether an entry of a changed text is what was read, and no entry that it changes was read as stated."""
+    if not numbers:
+        return False
+    number = entry.number
+    read, stated, changed = reading["read"][number], reading["stated"][number], numbers[number]
+    bar = FACTOR * eps * max(size_of(numbers, number), size_of(reading["stated"], number))
+    distances = changed - read, changed - stated, read - stated
+    if number.startswith("anchor"):  # any point of the axis is one
+        axis = numbers[number.replace("anchor", "axis")]
+        distances = tuple(d - axis * (axis * d).sum(axis=1, keepdims=True) for d in distances)
+    to_read, to_stated, is_wrong = (np.ravel(np.abs(distance) > bar) for distance in distances)
+    return bool(not to_read[entry.place] and to_stated[entry.place] and not (to_stated & ~is_wrong).any())
+
+
+def joints_lost(engine: str, file: File, speeds: int) -> Cause | None:
+    """Why an engine has this number of speeds, or None."""
+    origin = origin_of(file)
+    for kind in losses_of(engine):
+        changed, source = origin.without([LOSSES[kind]])
+        if changed and (source.model.nv if source else 0) == speeds:
+            return Cause(kind, some_of(changed))
+    return None
+
+
+def float32_meshes(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
+    """A difference of the size of the rounding of vertices, which MuJoCo keeps in single precision."""
+    read, stated = (np.ravel(reading[which][entry.number])[entry.place] for which in ("read", "stated"))
+    is_small = abs(read - stated) <= FACTOR * SINGLE * size_of(reading["stated"], entry.number)
+    return some_of(meshed_bodies(origin, entry)) if is_small and entry.number in MASSES else None
+
+
+def small_inertia(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
+    """All moments of a joint's bodies are larger by the same amount: some inertias were raised to a floor."""
+    if entry.number != "moments":
         return None
-    read, stated = entry.values("mass")
-    ratios = read[stated > 0.0] / stated[stated > 0.0]
-    return "settotalmass" if np.ptp(ratios) <= 1e-5 * abs(ratios[0]) else None
+    read, stated = (reading[which]["moments"][entry.joint] for which in ("read", "stated"))
+    raised = read - stated
+    is_even = np.ptp(raised) <= 1e-4 * raised.max(initial=0.0)
+    return some_of(entry.bodies) if is_even and raised.min() > 0.0 else None
 
 
-def mass_of_meshes(entry: Entry) -> str | None:
-    meshed = [name for name in entry.bodies if name in entry.text.meshed]
-    return some_of(meshed) if entry.geoms and meshed else None
+def mass_of_meshes(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
+    """The bodies have their mass of meshes; a copy has MuJoCo's inertia in their place."""
+    meshed = meshed_bodies(origin, entry) if entry.number in MASSES and not reading["copied"] else ()
+    return some_of(meshed) or None
 
 
-def mass_without_contacts(entry: Entry) -> str | None:
-    """The geoms of a body without an inertial do not collide, and the engine has less mass."""
-    if not entry.geoms:
-        return None
-    model, (read, stated) = entry.text.model, entry.values("mass")
-    geoms = np.isin(model.geom_bodyid, [model.body(name).id for name in entry.bodies])
-    touches = model.geom_contype[geoms] | model.geom_conaffinity[geoms]  # of those that are not only drawn
-    all_touch = touches.size and touches.all()
-    return some_of(entry.bodies) if read[entry.joint] < stated[entry.joint] and not all_touch else None
+def meshed_bodies(origin: Origin, entry: Entry) -> list[str]:
+    """Those of an entry that have meshes and no <inertial> in the file."""
+    stated = (
+        {body.name for body in origin.source.spec.bodies if body.explicitinertial}
+        if origin.source.spec
+        else set()
+    )
+    return [name for name in entry.bodies if name in origin.meshed - stated]
 
 
-def small_inertia(entry: Entry) -> str | None:
-    """The masses are right, and no moment of inertia is smaller than the compiled one: some are raised to a floor."""
-    if entry.number != "moments" or "mass" in entry.reading["mended"]:
-        return None
-    read, stated = entry.values("moments")
-    return some_of(entry.bodies) if (read >= stated * (1.0 - 1e-5)).all() else None
-
-
-def mass_of_geoms(entry: Entry) -> str | None:
-    return some_of(entry.bodies) if entry.geoms else None
-
-
-def is_displaced(entry: Entry, turn: Rotation, shift: np.ndarray) -> bool:
-    """Whether turn and shift lead from where the engine has a joint to where it is stated, or of one without an axis its body."""
-    (axis, stated_axis), (anchor, stated) = entry.values("axis"), entry.values("anchor")
-    joint = entry.joint
-    if not stated_axis[joint].any():
-        com, stated = entry.values("com")
-        return bool(np.allclose(turn.apply(com[joint]) + shift, stated[joint], atol=CLOSE))
-    beside = (turn.apply(anchor[joint]) + shift - stated[joint]) * stated[joint].any()  # 0 for a slide
-    is_on_line = np.allclose(np.cross(beside, stated_axis[joint]), 0.0, atol=CLOSE)
-    return bool(is_on_line and np.allclose(turn.apply(axis[joint]), stated_axis[joint], atol=CLOSE))
-
-
-def fixed_root(entry: Entry) -> str | None:
-    """Without the pose of a body on the world that has no joint, all is where the engine has it."""
-    model, root = entry.text.model, entry.root
-    if not root or model.body_jntnum[root]:
-        return None
-    shift, turn = model.body_pos[root], entry.text.turn(root)
-    has_pose = shift.any() or turn.magnitude()
-    return str(model.body(root).name) if has_pose and is_displaced(entry, turn, shift) else None
-
-
-def turned_start(entry: Entry) -> str | None:
+def turned_start(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
     """Positions of a free body are turned about the place that the file gives it, by the turn that it has there."""
-    model, root = entry.text.model, entry.root
+    model, root = (
+        origin.model,
+        origin.carriers(origin.file.names[entry.joint])[-1] if entry.number in PLACES else 0,
+    )
     if not root or model.body_dofnum[root] != 6:
         return None
-    turn, shift = entry.text.turn(root), model.body_pos[root]
-    is_so = turn.magnitude() and is_displaced(entry, Rotation.identity(), turn.apply(shift) - shift)
-    return str(model.body(root).name) if is_so else None
+    turn, shift = Rotation.from_quat(np.roll(model.body_quat[root], -1)), model.body_pos[root]
+    moved = turn.apply(shift) - shift
+    read, stated = (reading[which]["com"][entry.joint] for which in ("read", "stated"))
+    is_so = turn.magnitude() and np.allclose(read + moved, stated, atol=CLOSE)
+    return origin.name(root) if is_so else None
 
 
-def several_joints(entry: Entry) -> str | None:
+def oblique_turn(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
+    """The axis of an axisangle is not of length 1."""
+    for body in origin.root.iter("body"):
+        axis = [float(x) for x in body.get("axisangle", "0 0 1 0").split()[:3]]
+        carriers = [origin.name(carrier) for carrier in origin.carriers(origin.file.names[entry.joint])]
+        if abs(np.linalg.norm(axis) - 1.0) > CLOSE and body.get("name") in carriers:
+            return str(body.get("name"))
+    return None
+
+
+def several_joints(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
     """All that is at another place is carried by a body with several joints."""
-    model, several = entry.text.model, {}
-    for joint in entry.wrong:
-        bodies = entry.text.carriers(entry.joints[joint])
-        several[joint] = [body for body in bodies if model.body_jntnum[body] > 1]
+    several: dict[int, list[int]] = {}
+    for joint in {other.joint for other in entries if other.number == entry.number}:
+        bodies = origin.carriers(origin.file.names[joint])
+        several[joint] = [body for body in bodies if origin.model.body_jntnum[body] > 1]
     if entry.number not in PLACES or not all(several.values()):
         return None
-    return str(model.body(several[entry.joint][0]).name)
+    return origin.name(several[entry.joint][0])
 
 
-CAUSES: tuple[Callable[[Entry], str | None], ...] = (
-    class_without_joint, no_springs, armature_without_motor, option_gravity, total_mass, mass_of_meshes,
-    mass_without_contacts, small_inertia, mass_of_geoms, fixed_root, turned_start, several_joints,
-)  # fmt: skip
-
-
-def cause_of(entry: Entry) -> Cause | None:
-    """The first cause that fits an entry, or None."""
-    for find in CAUSES:
-        if subject := find(entry):
-            return Cause(find.__name__, subject)
-    return None
+SEEN = {find.__name__: find for find in (
+    float32_meshes, small_inertia, oblique_turn, mass_of_meshes, turned_start, several_joints,
+)}  # fmt: skip
+FLOAT32 = float32_meshes.__name__
+# what is known of each engine, in the order in which it is tried
+OF_ENGINES: Mapping[str, Sequence[str]] = {
+    "drake": (
+        "class_without_joint", "no_springs", "springdamper", "armature_of_actuator", "passive_of_free",
+        "armature_without_motor", "gravity_flag", "total_mass", "bounds", "groups", "shell_inertia", "frame", "replicate",
+        FLOAT32, "mass_of_meshes", "several_joints",
+    ),
+    "pinocchio": (
+        "joint_pos_of_class", "armature_of_actuator", "option_gravity", "gravity_flag", "total_mass", "bounds", "groups",
+        "geom_mass_of_class", "geoms_without_contacts", "fixed_root", "frame", "other_roots", "oblique_turn",
+        "mass_of_meshes", "turned_start",
+    ),
+    "newton": (
+        "springdamper", "armature_of_actuator", "passive_of_free", "option_gravity", "total_mass", "shell_inertia",
+        "replicate", "small_inertia", "mass_of_meshes", "several_joints",
+    ),
+}  # fmt: skip

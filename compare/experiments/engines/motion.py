@@ -8,6 +8,7 @@ import numpy as np
 from tmt.exact.motion import OTHER_ORDER, followed
 
 from ...robots.case import Case
+from ...truth.kept import kept
 from ...truth.reference import RECORDS, Reference, first_steps, has_no_reference, in_doubles, times
 from ..setup import Setup
 
@@ -54,10 +55,15 @@ def reference(case: Case) -> Reference:
 
 
 def by_series(case: Case, order: int) -> tuple[np.ndarray, int]:
-    """The records (<= 65, 2, nq + nv) of a run as far as it goes, and its steps."""
+    """The records (<= 65, 2, nq + nv) of a run as far as it goes, and its steps; computed once and kept."""
     q, v, tau = (values.tolist() for values in (*case.start, case.tau))
-    count, form = first_steps(case), "composite"
-    every, dt = count // RECORDS, case.duration / count
-    start = case.tree, q, v, tau, dt, count, every
-    path, steps, _ = followed(*start, form, order, TOLERANCE, MOST_OPERATIONS)
-    return path, steps
+    count = first_steps(case)
+    start = q, v, tau, case.duration / count, count, count // RECORDS
+    how = "composite", order, TOLERANCE, MOST_OPERATIONS
+
+    def computed() -> list[np.ndarray]:
+        path, steps, _ = followed(case.tree, *start, *how)
+        return [path, np.array(steps)]
+
+    path, steps = kept(computed, case.tree, "series", start, how)
+    return path, int(steps)

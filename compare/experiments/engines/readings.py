@@ -1,20 +1,20 @@
 """What each engine has read: the numbers that differ from the compiled model, body by body and joint by joint, and why."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ...core.check import About
 from ...core.words import some_of
-from ...engines import EngineRecord
+from ...engines import RECORDS, EngineRecord
 from ...engines.outside.bodies import size_of
 from ...engines.outside.file import File, OtherJoints
 from ...engines.outside.mjcf_text import REFUSED
 from ...engines.outside.model import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from .causes import Cause, Entry, Text, cause_of
+from .causes import FLOAT32, Cause, Entry, causes_of
 from .tables import EnginesResult, ReadRow, Share
 
 UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2", "axis": "", "anchor": "m",
@@ -32,8 +32,9 @@ OF_COPIES = {REFUSED: ["refused"], OtherJoints.__name__: ["joints"]}
 AS_READ = "as read"  # checks of numbers
 
 
-def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
-    """Rows of what the engine has read differently, and checks of the masses and moments of inertia."""
+def compare_numbers(result: EnginesResult, robot: Robot, engine: str, reading: Reading) -> None:
+    """Rows of what an engine has read differently, and checks of the masses and moments of inertia."""
+    record = RECORDS[engine]
     label, lacking, mended = record.label, list(reading["lacking"]), reading["mended"]
     share = result.readers[label] = Share(reading["way"], reading["unwritten"])
     if reading["copied"]:
@@ -43,47 +44,61 @@ def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, r
     if lacking:
         result.find("lacking", engine=label, numbers=lacking)
         share.differing += [f"no {number}" for number in lacking]
-    for number in reading["read"]:
-        if number in OF_BODIES:
-            most = np.abs(reading["read"][number] - reading["stated"][number]).max(initial=0.0)
-            pair = float(most), tolerance_of(reading, record, number)
-            result.check(label, f"{number} {AS_READ}", *pair, UNITS[number], "", True, about=About.ENGINE)
-        follows = any(cause in mended for cause in FOLLOWS.get(number, ()))
-        if number in mended and number not in lacking and not follows:
-            add_differing(result, robot, record, reading, number)
+    for number in [number for number in OF_BODIES if number in reading["read"]]:
+        most = np.abs(reading["read"][number] - reading["stated"][number]).max(initial=0.0)
+        pair = float(most), tolerance_of(reading, record, number)
+        result.check(label, f"{number} {AS_READ}", *pair, UNITS[number], "", True, about=About.ENGINE)
+    listed = [number for number in mended if number not in lacking]
+    listed = [number for number in listed if not set(FOLLOWS.get(number, ())) & mended.keys()]
+    entries = [entry for number in listed for entry in differing(robot, record, reading, number)]
+    causes = causes_of(engine, file_of(robot), reading, entries)
+    for number in listed:
+        of_number = {entry: causes.get(entry) for entry in entries if entry.number == number}
+        add_differing(result, robot, record, reading, of_number)
+    numbers: dict[Cause | None, list[str]] = {}
+    for entry in entries:
+        numbers.setdefault(causes.get(entry), []).append(entry.number.removesuffix("_moved"))
+    for cause, of_cause in numbers.items():
+        result.find("cause", engine=label, cause=cause, numbers=list(dict.fromkeys(of_cause)))
 
 
 def tolerance_of(reading: Reading, record: EngineRecord, number: str) -> float:
     return FACTOR * record.eps * size_of(reading["stated"], number)
 
 
-def add_differing(
-    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading, number: str
-) -> None:
-    """Rows and a finding of a number that an engine has read differently, with the cause of each entry."""
+def file_of(robot: Robot) -> File:
+    return File(Path(robot.mjcf), robot.joints, robot.coordinates.all_kinds)
+
+
+def differing(robot: Robot, record: EngineRecord, reading: Reading, number: str) -> list[Entry]:
+    """The entries of a number that an engine has read differently."""
     values, stated = (np.ravel(reading[which][number]) for which in ("read", "stated"))
+    _, joints = named_after(robot, number.removesuffix("_moved"))
+    is_right = np.abs(values - stated) <= tolerance_of(reading, record, number)
+    bodies = [tuple(names) for names in bodies_of(robot)]
+    places = np.flatnonzero(~is_right).tolist()
+    return [Entry(number, place, joints[place], bodies[joints[place]]) for place in places]
+
+
+def add_differing(
+    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading, causes: Mapping[Entry, Cause | None]
+) -> None:  # fmt: skip
+    """Rows and a finding of a number that an engine has read differently; causes: of its entries."""
+    number = next(iter(causes)).number
     quantity, label, is_set = number.removesuffix("_moved"), record.label, reading["mended"][number]
-    names, joints = named_after(robot, quantity)
-    differs = ~(np.abs(values - stated) <= tolerance_of(reading, record, number))
-    places = np.flatnonzero(differs).tolist()
-    wrong, bodies = {joints[place] for place in places}, bodies_of(robot)
-    file = File(Path(robot.mjcf), robot.joints, robot.coordinates.all_kinds)
-    text, rows = Text(file), []
-    causes: dict[Cause | None, str] = {}
-    for place in places:
-        joint = joints[place]
-        cause = cause_of(Entry(text, reading, number, robot.joints, joint, bodies[joint], place, wrong))
-        causes.setdefault(cause, names[place])
-        pair = float(values[place]), float(stated[place])
-        rows.append(
-            ReadRow(label, number, names[place], *pair, UNITS[quantity], is_set, cause and str(cause))
-        )
+    values, stated = (np.ravel(reading[which][number]) for which in ("read", "stated"))
+    names, rows = named_after(robot, quantity)[0], []
+    for entry, cause in causes.items():
+        pair = float(values[entry.place]), float(stated[entry.place])
+        text = cause and str(cause)
+        rows.append(ReadRow(label, number, names[entry.place], *pair, UNITS[quantity], is_set, text))
     result.tables["engines_read"] += rows
-    result.find("read_differently", engine=label, rows=rows, number=number, mended=is_set, count=len(wrong))
-    for cause in causes:
-        result.find("cause", engine=label, cause=cause, number=quantity)
-    differing = result.readers[label].differing
-    differing += [] if quantity in differing else [quantity]
+    count = len({entry.joint for entry in causes})
+    result.find("read_differently", engine=label, rows=rows, number=number, mended=is_set, count=count)
+    listed = result.readers[label].differing
+    is_rounding = {cause.kind if cause else "" for cause in causes.values()} == {FLOAT32}
+    word = "rounding of meshes" if is_rounding else quantity
+    listed += [] if word in listed else [word]
 
 
 def named_after(robot: Robot, number: str) -> tuple[list[str], list[int]]:

@@ -24,7 +24,7 @@ from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
 from . import numbers
-from .common import Numbers, causes_in_common
+from .common import causes_in_common
 from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, touches
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
@@ -55,8 +55,7 @@ def rows(setup: Setup) -> Result:
         result.rows += numbers.rows_of(number, unit, number.why if is_of_file else None)
         if number.stated is not None and not number.why:
             words = joints if number.quantity == "parent" else {}
-            causes = numbers.compare_number(result, number, unit, words)
-            compared.append(Numbers(number, unit, causes))
+            compared.append(numbers.compare_number(result, number, unit, words))
     result.causes = causes_in_common(compared, () if is_of_file else without_inertial(setup, dynamics))
     texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
     if extra := dynamics.additional_bodies():
@@ -83,7 +82,7 @@ def urgency(cause: Cause) -> tuple[int, bool, float]:
 
 
 def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:
-    """The bodies, by the robot's names, whose mass the compiler takes from geoms: the file states no inertial."""
+    """The bodies, by the robot's names, whose mass is that of geoms: the file states no inertial."""
     source = setup.engines["mujoco"].source if isinstance(setup.engines["mujoco"], Mujoco) else None
     if source is None or source.spec is None:
         return []
@@ -116,7 +115,7 @@ def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
 
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict[str, Any]:
-    """The numbers of a Tree by quantity, per joint, speed, position or body, or one; joints and bodies in this order."""
+    """The numbers of a Tree by quantity, for these joints, their speeds and positions, and bodies."""
     anchors, _, _ = places_of(tree)
     places = [tree.coordinates.joints[j] for j in joints]
     counts = [place.q.stop - place.q.start for place in places]

@@ -1,94 +1,83 @@
-"""One cause for numbers that are wrong together: a common factor, exchanged, the same at several places, a vector."""
+"""One cause for numbers that are wrong together: a factor, exchanged, alike at several places, a vector."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...core.cause import Cause
-from ...core.text import block
-from ...engines.mujoco.parameters import Stated
+from ...core.finding import Finding
+from ...core.text import say
 from ...robots.coordinates import point_inertia
-from .numbers import COMPONENTS
+from .numbers import COMPONENTS, Compared
 
 SAME = 1e-9  # relative: a factor, or a number, that is the same at several places
 ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("anchor", "com"))  # quantities with a common factor
 OF_INERTIAL = ("mass", "com", "inertia")
 
 
-class Numbers(NamedTuple):
-    """A quantity of a body or a joint, and its causes, one for each component that differs."""
-
-    number: Stated
-    unit: str
-    causes: list[Cause]
-
-    @property
-    def stated(self) -> np.ndarray:
-        return np.array(self.number.stated, float).ravel()
-
-    @property
-    def compiled(self) -> np.ndarray:
-        return np.array(self.number.compiled, float).ravel()
-
-
-def causes_in_common(numbers: Sequence[Numbers], from_geoms: Sequence[str]) -> list[Cause]:
+def causes_in_common(numbers: Sequence[Compared], from_geoms: Sequence[str]) -> list[Cause]:
     """The causes of all numbers, of one error one. from_geoms: bodies for which the file has no inertial."""
     left, causes = [each for each in numbers if each.causes], list[Cause]()
 
-    def explain(together: Sequence[Numbers], *cause: Cause) -> None:
+    def explain(together: Sequence[Compared], cause: Cause) -> None:
         nonlocal left
-        causes.extend(cause)
+        causes.append(cause)
         left = without(left, together)
 
     for quantities in ALIKE:
-        together = [each for each in numbers if each.number.quantity in quantities and each.stated.any()]
+        together = [each for each in numbers if each.quantity in quantities and each.stated.any()]
         factor = common_factor(together)
         if factor and len(without(left, together)) == len(left) - len(together):
-            values = {"quantities": quantities, "factor": factor}
-            explain(together, as_one(together, "factor", values, 1.0, factor))
-    order = [each for each in left if each.number.quantity == "order"]
+            cause = as_one("factor", together, quantities=quantities, factor=factor)
+            explain(together, replace(cause, stated=1.0, explains=factor))
+    order = [each for each in left if each.quantity == "order"]
     if len(order) > 1:
-        every = [each for each in numbers if each.number.quantity == "order"]
-        right = [each.number.place for each in every]
-        file = [each.number.place for each in sorted(every, key=lambda each: each.compiled[0])]
-        names = ", ".join(right), ", ".join(file)
-        explain(order, as_one(order, "order", {"file": file, "stated": right}, *names))
-    for body in dict.fromkeys(each.number.place for each in left):
-        of_body = [each for each in left if each.number.place == body and each.number.quantity in OF_INERTIAL]
+        every = [each for each in numbers if each.quantity == "order"]
+        right, file = ([each.place for each in those] for those in (every, sorted(every, key=number_in_file)))
+        cause = as_one("order", order, file=file, stated=right)
+        explain(order, replace(cause, stated=", ".join(right), explains=", ".join(file)))
+    for body in dict.fromkeys(each.place for each in left):
+        of_body = [each for each in left if each.place == body and each.quantity in OF_INERTIAL]
         if body in from_geoms and len(of_body) > 1:
-            explain(of_body, as_one(of_body, "from_geoms", {"body": body, "numbers": of_body}))
+            explain(of_body, as_one("from_geoms", of_body))
         elif load := load_of(of_body):
-            explain(of_body, as_one(of_body, "load", {"body": body, **load}))
+            explain(of_body, as_one("load", of_body, **load))
     while left:
-        together = alike(left)
-        explain(together, *of_group(together))
+        explain(*of_first(left))
     return causes
 
 
-def without(numbers: Sequence[Numbers], others: Sequence[Numbers]) -> list[Numbers]:
-    names = [(each.number.place, each.number.quantity) for each in others]
-    return [each for each in numbers if (each.number.place, each.number.quantity) not in names]
+def without(numbers: Sequence[Compared], others: Sequence[Compared]) -> list[Compared]:
+    names = [(each.place, each.quantity) for each in others]
+    return [each for each in numbers if (each.place, each.quantity) not in names]
 
 
-def load_of(numbers: Sequence[Numbers]) -> dict[str, Any] | None:
+def number_in_file(order: Compared) -> float:
+    return float(order.compiled[0])
+
+
+def load_of(numbers: Sequence[Compared]) -> dict[str, Any] | None:
     """The mass, kg, and the place, m from the joint, of a body that is added or missing, if one is."""
     if len(numbers) < len(OF_INERTIAL):
         return None
-    by_name = {each.number.quantity: each for each in numbers}
-    (stated_mass,), (mass,) = by_name["mass"].stated, by_name["mass"].compiled
-    stated_com, com = by_name["com"].stated, by_name["com"].compiled
+    stated, compiled = (
+        {each.quantity: getattr(each, side) for each in numbers} for side in ("stated", "compiled")
+    )
+    (stated_mass,), (mass,) = stated["mass"], compiled["mass"]
     added = mass - stated_mass
-    place = (mass * com - stated_mass * stated_com) / added
-    about_joint = (by_name["inertia"].compiled - by_name["inertia"].stated).reshape(3, 3)
-    about_joint = about_joint + point_inertia(com, mass) - point_inertia(stated_com, stated_mass)
+    place = (mass * compiled["com"] - stated_mass * stated["com"]) / added
+    about_joint = (compiled["inertia"] - stated["inertia"]).reshape(3, 3)
+    about_joint = (
+        about_joint + point_inertia(compiled["com"], mass) - point_inertia(stated["com"], stated_mass)
+    )
     low, middle, high = np.linalg.eigvalsh((about_joint - point_inertia(place, added)) * np.sign(added))
     is_body = low >= -SAME * high and high <= (low + middle) * (1.0 + SAME)
     return {"mass": abs(added), "place": place.tolist(), "is_added": added > 0.0} if is_body else None
 
 
-def common_factor(numbers: Sequence[Numbers]) -> float | None:
+def common_factor(numbers: Sequence[Compared]) -> float | None:
     """The factor, not 1, between all stated and compiled numbers of at least two places, if there is one."""
     if len(numbers) < 2:
         return None
@@ -99,69 +88,47 @@ def common_factor(numbers: Sequence[Numbers]) -> float | None:
     return factor if is_common and abs(factor - 1.0) > SAME else None
 
 
-def alike(numbers: Sequence[Numbers]) -> list[Numbers]:
-    """The first of some numbers, and those that are wrong with it: exchanged, or changed in the same way."""
+def of_first(numbers: Sequence[Compared]) -> tuple[list[Compared], Cause]:
+    """The first of some numbers with those that are exchanged, or wrong in the same way, and their cause."""
     first, *others = numbers
-    same = [each for each in others if each.number.quantity == first.number.quantity]
-    exchanged = [
-        each for each in same if is_near(each.stated, first.compiled) and is_near(each.compiled, first.stated)
-    ]
+    same = [each for each in others if each.quantity == first.quantity]
+    exchanged = [each for each in same if is_near(each.stated, first.compiled)]
+    exchanged = [each for each in exchanged if is_near(each.compiled, first.stated)]
     if len(same) == len(exchanged) == 1:
-        return [first, *exchanged]
-    if first.number.quantity == "anchor":  # those that hang on it move with it
-        change = first.compiled - first.stated
-        return [first, *(each for each in same if is_near(each.compiled - each.stated, change))]
-    equal = [
-        each for each in same if is_near(each.stated, first.stated) and is_near(each.compiled, first.compiled)
-    ]
-    return [first, *equal]
+        return [first, *exchanged], as_one("exchanged", [first, *exchanged])
+    hanging = [each for each in same if is_near(each.compiled - each.stated, first.compiled - first.stated)]
+    if hanging and first.quantity == "anchor":  # they move with it
+        change = (first.compiled - first.stated).tolist()
+        return [first, *hanging], as_one("moved", [first, *hanging], change=change)
+    alike = [each for each in same if is_near(each.stated, first.stated)]
+    together = [first, *(each for each in alike if is_near(each.compiled, first.compiled))]
+    if len(together) == len(first.causes) == 1:
+        return together, first.causes[0]
+    if first.quantity == "axis" and is_near(first.compiled, -first.stated) and len(together) == 1:
+        return together, as_one("opposite", together)
+    return together, as_one("vector", together, **values_of(first))
 
 
 def is_near(values: np.ndarray, others: np.ndarray) -> bool:
     return bool(np.abs(values - others).max() <= SAME * np.abs(others).max())
 
 
-def of_group(numbers: Sequence[Numbers]) -> list[Cause]:
-    """The cause of numbers of one quantity that are wrong together."""
-    first, *others = numbers
-    values: dict[str, Any] = {"numbers": numbers, "quantity": first.number.quantity, "unit": first.unit}
-    values["places"] = [each.number.place for each in numbers]
-    if others and not is_near(first.stated, others[0].stated) and is_near(others[0].stated, first.compiled):
-        return [as_one(numbers, "exchanged", values)]
-    if others and first.number.quantity == "anchor":
-        values["change"] = (first.compiled - first.stated).tolist()
-        return [as_one(numbers, "moved", values)]
-    if others:
-        return [as_one(numbers, "several", values | values_of(first))]
-    if len(first.causes) == 1:
-        return first.causes
-    is_axis_turned = first.number.quantity == "axis" and is_near(first.compiled, -first.stated)
-    if is_axis_turned:
-        return [as_one(numbers, "opposite", values)]
-    return [as_one(numbers, "vector", values | values_of(first))]
-
-
-def values_of(number: Numbers) -> dict[str, Any]:
-    """What is said of a vector or a tensor: components that differ, and whether two of a diagonal are exchanged."""
-    names = COMPONENTS[len(number.stated)]
-    differs = np.abs(number.compiled - number.stated) > number.number.tolerance
-    is_upper = np.array([name == "".join(sorted(name)) for name in names])
-    shown = np.flatnonzero((differs & is_upper) if len(names) == 9 else np.ones(len(names), bool))
+def values_of(number: Compared) -> dict[str, Any]:
+    """What is said of a vector or tensor: components that differ, whether two of a diagonal are exchanged."""
+    names, shown = COMPONENTS[len(number.stated)], np.arange(len(number.stated))
+    is_tensor = len(names) == 9
+    if is_tensor:
+        is_upper = np.array([name == "".join(sorted(name)) for name in names])
+        shown = np.flatnonzero(is_upper & (np.abs(number.compiled - number.stated) > number.tolerance))
     stated, compiled = number.stated[shown], number.compiled[shown]
-    is_exchanged = len(names) == 9 and len(shown) == 2 and is_near(stated, compiled[::-1])
-    components = [names[k] for k in shown]
-    return {"components": components if len(names) == 9 else [], "stated": stated.tolist(),
-            "compiled": compiled.tolist(), "is_exchanged": is_exchanged}  # fmt: skip
+    return {"components": [names[k] for k in shown] if is_tensor else [], "stated": stated.tolist(),
+            "compiled": compiled.tolist(),
+            "is_exchanged": is_tensor and len(shown) == 2 and is_near(stated, compiled[::-1])}  # fmt: skip
 
 
-def as_one(
-    numbers: Sequence[Numbers], kind: str, values: Mapping[str, Any], stated: Any = None, compiled: Any = None
-) -> Cause:
-    """A cause instead of those of some numbers. stated, compiled: None: those of the first cause."""
+def as_one(kind: str, numbers: Sequence[Compared], **values: Any) -> Cause:
+    """A cause in place of those of some numbers; the first of these has its numbers."""
     causes = [cause for each in numbers for cause in each.causes]
-    first, text = causes[0], block("parameters", kind, **values)
-    place = text.partition(":")[0]
-    if stated is None:
-        stated, compiled = first.stated, first.explains
+    text = say(Finding("parameters", kind, {"numbers": numbers, **values}))
     size, rank = max(cause.size for cause in causes), min(cause.rank for cause in causes)
-    return replace(first, place=place, stated=stated, explains=compiled, text=text, size=size, rank=rank)
+    return replace(causes[0], place=text.partition(":")[0], text=text, size=size, rank=rank)

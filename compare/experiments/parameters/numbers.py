@@ -1,4 +1,4 @@
-"""A number, stated and compiled: its rows, check and causes; that no other forces act; what touches."""
+"""Numbers, stated and compiled: their rows, checks and causes; that no other forces act; what touches."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -29,10 +29,10 @@ OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "con
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 OF_BODIES = ("mass", "com", "inertia", "gravcomp")
 UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *ABSENT), "") | {
-    "ref": "rad", "anchor": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "frictionloss": "N m",
-    "stiffness": "N m/rad",
-    "mass": "kg", "com": "m", "inertia": "kg m2", "rest": "rad", "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s",
-    "other mass": "kg", "tendon armature": "kg m2", "actuator armature": "kg m2",
+    "ref": "rad", "anchor": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "rest": "rad",
+    "frictionloss": "N m", "stiffness": "N m/rad", "mass": "kg", "com": "m", "inertia": "kg m2",
+    "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s", "other mass": "kg",
+    "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
 FINER = 8  # steps in one of the scene, in which contacts are looked for
 COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
@@ -67,6 +67,18 @@ class FeatureRow(Row):
         return cls(**asdict(feature) | {"count": feature.count, "names": ";".join(feature.names)})
 
 
+class Compared(NamedTuple):
+    """A number, vector or tensor of a body or joint, and its causes, one for each component that differs."""
+
+    place: str
+    quantity: str
+    unit: str
+    tolerance: float
+    stated: np.ndarray  # (components,)
+    compiled: np.ndarray
+    causes: list[Cause]
+
+
 def unit_of(quantity: str, slides: bool) -> str:
     """The unit of a number of a body, or of a joint that turns or slides."""
     return unit_of_joint(UNITS[quantity], "slide" if slides and quantity not in OF_BODIES else "hinge")
@@ -85,10 +97,10 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
     return rows
 
 
-def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> list[Cause]:
-    """Add the check of a number of a body or joint; the causes, one for each component that differs.
+def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> Compared:
+    """Add the check of a number of a body or joint.
 
-    words: for whole numbers. Rank 1: an option, or a convention of a joint (order, sign, zero); 2: one number.
+    words: for whole numbers. Rank 1: an option or a convention of a joint (order, sign, zero); 2: one number.
     """
     quantity, tolerance = number.quantity, number.tolerance
     stated, compiled = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
@@ -97,7 +109,7 @@ def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int
     value, bound = (compiled[0], stated[0]) if is_whole else (difference.max(), tolerance)
     rule = "equal" if is_whole else "at most"
     result.check(number.place, quantity, value, bound, unit, rounding=not is_whole, rule=rule)
-    is_flipped = quantity == "axis" and bool(np.abs(stated + compiled).max() <= tolerance)
+    is_flipped = quantity == "axis" and np.abs(stated + compiled).max() <= tolerance
     rank = 1 if is_flipped or quantity in OPTIONS else 2
     owner = "" if number.place == "world" else f"of {number.place}"
     causes = []
@@ -107,10 +119,11 @@ def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int
             texts = [words.get(value, f"{value:.7g} {unit}".rstrip()) for value in (a, b)]
             if texts[0] == texts[1]:
                 texts = [f"{float(value)!r} {unit}".rstrip() for value in (a, b)]
-            text = f"{place}: stated {texts[0]}, compiled {texts[1]}" + " (the opposite sign)" * is_flipped
+            text = f"{place}: stated {texts[0]}, compiled {texts[1]}"
+            text += " (the opposite sign)" if is_flipped else ""
             size = difference[k] / tolerance if tolerance else np.inf
             causes.append(cause(place, a, b, text, rank=rank, size=float(size), quantity=quantity))
-    return causes
+    return Compared(number.place, quantity, unit, tolerance, stated, compiled, causes)
 
 
 def cause(place: str, stated: float, compiled: float, text: str, **more: Any) -> Cause:
@@ -148,7 +161,7 @@ class Touch(NamedTuple):
 
 
 def touches(setup: Setup, dynamics: MujocoDynamics) -> list[Touch]:
-    """The pairs of geoms that touch, each where it first does: in a scene as MuJoCo runs it, at a random state."""
+    """The pairs of geoms that touch, each where it first does: in a scene by MuJoCo, at a random state."""
     if not dynamics.may_touch:
         return []
     found: dict[tuple[str, str], Touch] = {}

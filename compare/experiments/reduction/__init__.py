@@ -1,28 +1,28 @@
 """What each scene needs of the model: the joints that can be locked without changing its motion."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
 from tmt.exact.tree import DIGITS
 
-from ...core.check import About
-from ...core.finding import Finding
+from ...core.check import About, Result
 from ...engines.mujoco import ModelError
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...robots.case import Case
-from ...truth.smallest import needed
+from ...truth.smallest import Needed, needed
 from .. import Experiment
 from ..setup import Setup
 from . import of_file
 from .exact_motion import compare_swing, is_pendulum
-from .records import Need, NeedRow, ReductionResult
+from .records import NeedRow
 from .sub_blocks import compare_blocks
 
 EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
+    first_screen=("answer",),
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
 )
 
@@ -32,9 +32,9 @@ def claim_values(robot: Robot) -> dict[str, str | float]:
     return {"joint": joint, "digits": DIGITS, "eps": FACTOR}
 
 
-def rows(setup: Setup) -> ReductionResult:
-    """Sub-blocks with joints locked; of a file what its motion needs, of the arm what each scene needs; exact swings."""
-    result, robot = ReductionResult("reduction"), setup.robot
+def rows(setup: Setup) -> Result:
+    """Sub-blocks with joints locked; what the motion of a file or each scene of the arm needs; swings."""
+    result, robot, needs = Result("reduction"), setup.robot, dict[Case, Needed]()
     if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
         result.find("driven", scenes=driven)
     try:
@@ -42,7 +42,7 @@ def rows(setup: Setup) -> ReductionResult:
             compare_blocks(result, setup, setup.of(10, 1 if robot.is_read else 3, 1))
         for case in robot.cases_of_torque:
             if not robot.is_read:
-                add_need(result, case)
+                needs[case] = needed(case)
             if is_pendulum(case):
                 compare_swing(result, setup, case)
     except ModelError as error:
@@ -60,38 +60,34 @@ def rows(setup: Setup) -> ReductionResult:
             failing = sum(not check.passed for check in result.checks if check.rounding)
             count = len({row.locked for row in subsets})
             result.top.append(result.finding("blocks", count=count, failing=failing))
-    result.top += answers(result, robot)
+    add_needs(result, needs)
     return result
 
 
 def is_asked(setup: Setup) -> bool:
-    """Whether a run answers what a motion of the file needs: by itself, in a full run, or with an option of it."""
+    """Whether a run answers what a motion of the file needs: alone, in a full run, or with an option of it."""
     request = setup.request
     given = request.error, request.points, request.controls, request.write
     return setup.alone or setup.size == "full" or any(option is not None for option in given)
 
 
-def answers(result: ReductionResult, robot: Robot) -> list[Finding]:
-    """What scenes need, a finding for those that need the same; what can be locked comes last."""
-    groups: dict[Need, list[str]] = {}
-    for scene, need in result.needs.items():
-        groups.setdefault(need, []).append(scene)
-    findings, about = [], claim_values(robot)
-    for need, scenes in sorted(groups.items(), key=lambda group: bool(group[0].needed and group[0].stays)):
-        findings.append(result.finding("answer", scenes=scenes, about=about, **need._asdict()))
-    return findings
+def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
+    """What scenes need: a row for each joint, a finding for scenes with the same; joints to lock come last."""
+    groups: dict[tuple[tuple[str, ...], ...], list[Case]] = {}
+    for case, need in needs.items():
+        names = tuple(name for name in case.joints if name in need.moves)
+        rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
+        result.tables.setdefault("reduction_needs", []).extend(rows)
+        groups.setdefault((names, case.scene.locked, need.stays), []).append(case)
+    for numbers, cases in sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2])):
+        about, scenes = claim_values(cases[0].robot), [case.name for case in cases]
+        moving, locked, stays = numbers
+        result.top.append(
+            result.finding("answer", scenes=scenes, needed=moving, locked=locked, stays=stays, about=about)
+        )
 
 
-def add_need(result: ReductionResult, case: Case) -> None:
-    """Which joints a case needs, and why."""
-    need = needed(case)
-    names = tuple(name for name in case.joints if name in need.moves)
-    rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
-    result.tables.setdefault("reduction_needs", []).extend(rows)
-    result.needs[case.name] = Need(names, case.scene.locked, need.stays)
-
-
-def figures(result: ReductionResult, robot: Robot) -> Iterator[partial[Any]]:
+def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:
     from . import figures_reduction  # matplotlib is for the process that draws
 
     if frontier := result.tables.get("reduction_frontier"):

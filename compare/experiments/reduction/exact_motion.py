@@ -9,7 +9,6 @@ from ...judge.run import MOVES
 from ...robots.case import Case
 from ...truth.pendulum import pendulum, swing
 from ..setup import Setup
-from .records import ReductionResult
 
 COARSE, FINE = 32, 64  # multiples of the steps of the case
 ORDER = 4  # of RK4
@@ -23,7 +22,7 @@ def is_pendulum(case: Case) -> bool:
     return is_hinge and case.is_free and case.scene.gravity and not is_forced
 
 
-def compare_swing(result: ReductionResult, setup: Setup, case: Case) -> None:
+def compare_swing(result: Result, setup: Setup, case: Case) -> None:
     """The error of RK4 falls at its order; not checked where the hinge turns over or hardly moves."""
     (q,), (v,), t = *case.start, np.linspace(0.0, case.duration, case.steps + 1)
     hanging, frequency = pendulum(case.tree)

@@ -6,14 +6,15 @@ from itertools import cycle, product
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ...core.check import Result
 from ...core.finding import Finding
 from ...report.style import LINES, WIDTH
-from .records import FrontierRow, ReductionResult
+from .records import FrontierRow
 
 MARKS_OF_INTEGRATORS = "osD^v"
 
 
-def draw_frontier(result: ReductionResult, rows: Sequence[FrontierRow]) -> tuple[str, Figure, Finding]:
+def draw_frontier(result: Result, rows: Sequence[FrontierRow]) -> tuple[str, Figure, Finding]:
     """Time over error: a colour for each model, a mark for each integrator."""
     fig = Figure(figsize=(WIDTH, 4.5), layout="constrained")
     ax = fig.subplots()

@@ -1,4 +1,4 @@
-"""Which steps are stable where a robot rests near the start of its motion: of the whole file and of smaller ones."""
+"""Which steps are stable where a robot rests near its start: of the whole file and of smaller ones."""
 
 from collections.abc import Iterable, Sequence
 

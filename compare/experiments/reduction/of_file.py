@@ -1,4 +1,4 @@
-"""No more model than a motion of a file needs: the answer, its tables, its checks, and the file to take away."""
+"""No more model than a motion of a file needs: the answer, tables, checks, the file to take away."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,24 +9,23 @@ import numpy as np
 import tmt
 from tmt import Tree
 
-from ...core.check import About
+from ...core.check import About, Result
 from ...core.text import block
 from ...engines.mujoco.motion import near, stages_of
 from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, assets_of, files_of, finished, of_parts
 from ...engines.mujoco.source import Source
-from ...judge.agree import worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit, number_or_none
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ..setup import Setup
 from .limits import compared_limits, stable_answers
-from .records import FreeRow, JointRow, PairRow, ReductionResult, StageRow, SubsetRow, UseRow
+from .records import FreeRow, JointRow, PairRow, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
 from .search import Answer, Locks, frontier, seconds_of, take_out
-from .sub_blocks import check_blocks, units_of
+from .sub_blocks import check_blocks, differences, units_of
 
 TEXT = "reduction_of_file"  # the template
 ERROR = 1e-3  # rad or m, if none is asked for
@@ -36,7 +35,7 @@ DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
 STILL = 1e-3  # rad or m: where no joint moves more, the robot stands
 
 
-def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
+def add(result: Result, setup: Setup, reading: Reading) -> None:
     """Rows, checks and findings of a motion of a file, the answer first."""
     allowed = setup.request.error or ERROR
     errors = allowed / TENFOLD, allowed, allowed * TENFOLD
@@ -56,13 +55,14 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
     candidate = next(candidate for candidate in candidates if candidate.row is row)
     locked = locks.positions(candidate.groups)
     small = finished(candidate.small, scene.motions, row.dt, row.integrator)
+    stay = {actuator.name for actuator in small.spec.actuators}
     facts = {
         "answers": answers,
         "chosen": chosen,
         "whole": rows[0],
         "scene": {"name": scene.name, "duration": scene.duration},
         "names": list(locked),
-        "actuators": actuators_gone(scene.whole, small),
+        "actuators": [each.name for each in scene.whole.spec.actuators if each.name not in stay],
         "of_actuators": number_of_actuators(scene.whole.model),
         "count": len(scene.use.ranges),
         "moved": max((scene.use.ranges[name] for name in locked), default=0.0),
@@ -90,13 +90,9 @@ def add(result: ReductionResult, setup: Setup, reading: Reading) -> None:
 
 
 def add_tables(
-    result: ReductionResult,
-    scene: Scene,
-    locks: Locks,
-    names: list[str],
-    kinds: list[tuple[FreeRow, Smaller]],
+    result: Result, scene: Scene, locks: Locks, names: list[str], kinds: list[tuple[FreeRow, Smaller]],
     small: Smaller,
-) -> None:
+) -> None:  # fmt: skip
     """Stages of a step, what was used, what was taken out and its time, joints, pairs that came near."""
     use = scene.use
     stages = [stages_of(scene.simulation(file)) for file in (scene.whole, locks.free, small)]
@@ -120,12 +116,6 @@ def add_tables(
     result.tables["reduction_near"] = [PairRow(*pair, distance) for pair, distance in pairs.items()]
 
 
-def actuators_gone(whole: Smaller, small: Smaller) -> list[str]:
-    """Those of locked joints, and those without force."""
-    names = {actuator.name for actuator in small.spec.actuators}
-    return [actuator.name for actuator in whole.spec.actuators if actuator.name not in names]
-
-
 def use_of(scene: Scene) -> list[UseRow]:
     """What the file has and the motion used."""
     use, model = scene.use, scene.whole.model
@@ -143,15 +133,10 @@ def use_of(scene: Scene) -> list[UseRow]:
 
 
 def add_checks(
-    result: ReductionResult,
-    scene: Scene,
-    free: Smaller,
-    locked: Mapping[str, np.ndarray],
-    chosen: Answer,
-    small: Smaller,
-    written: Smaller,
-) -> float:
-    """What is taken out changes no bit; the written file is within the error; its equations are those of tmt's lock.
+    result: Result, scene: Scene, free: Smaller, locked: Mapping[str, np.ndarray], chosen: Answer,
+    small: Smaller, written: Smaller,
+) -> float:  # fmt: skip
+    """What is taken out changes no bit; the written file is within the error and has tmt's locked equations.
 
     How far the written file, with six digits, is from the model in memory, rad or m.
     """
@@ -170,17 +155,15 @@ def add_checks(
     return scene.apart(paths, scene.run(small, row.dt, row.integrator))
 
 
-def compare_locked(result: ReductionResult, where: str, tree: Tree, smaller: Tree) -> None:
+def compare_locked(result: Result, where: str, tree: Tree, smaller: Tree) -> None:
     """Mbar and the bias of a Tree with joints locked, and of the smaller model, at random states."""
     coordinates, rng = Coordinates(tree.joint_names, tree.kind), np.random.default_rng(SEED)
     q, v = coordinates.random(rng, STATES), rng.uniform(-1.0, 1.0, (STATES, coordinates.nv))
     bodies, others = tree.body_joint, smaller.body_joint
     fused = np.array([bodies.count(joint) - others.count(joint) + 1 for joint in bodies])
     scale = Entries(tree, q, v, np.maximum(1, fused))
-    masses = tmt.mass_matrix(q, model=tree) - tmt.mass_matrix(q, model=smaller)
-    biases = tmt.bias(q, v, model=tree) - tmt.bias(q, v, model=smaller)
-    compared = (("Mbar", masses, scale.mass_matrix), ("bias", biases, scale.bias))
-    for quantity, differences, entries in compared:
-        unit, parties = units_of(coordinates)[quantity], "lock of tmt to the smaller model"
-        row = SubsetRow(locked="", quantity=quantity, parties=parties, unit=unit)
-        check_blocks(result, where, row, *worst_of_each(differences, entries))
+    both = [(tmt.mass_matrix(q, model=model), tmt.bias(q, v, model=model)) for model in (tree, smaller)]
+    compared = differences({"lock of tmt to the smaller model": both}, (scale.mass_matrix, scale.bias))
+    for (quantity, pair), (apart, sizes) in compared.items():
+        row = SubsetRow(locked="", quantity=quantity, parties=pair, unit=units_of(coordinates)[quantity])
+        check_blocks(result, where, row, apart, sizes)

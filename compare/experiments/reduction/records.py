@@ -1,9 +1,7 @@
 """What reduction finds: rows of its tables, and what each scene needs."""
 
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from dataclasses import dataclass
 
-from ...core.check import Result
 from ...core.rows import Row, column
 
 
@@ -29,7 +27,7 @@ class SubsetRow(Row):
 
 @dataclass
 class StageRow(Row):
-    """A stage of a step by MuJoCo's own timers: of the whole file, without what is not used, and of the smaller file."""
+    """A stage of a step by MuJoCo's timers: of the whole file, without what is not used, smaller."""
 
     stage: str
     whole_file: float = column("us")
@@ -62,7 +60,8 @@ class FreeRow(Row):
 class JointRow(Row):
     """How far a joint moved, rad or m. None: it is not to be locked.
 
-    predicted: how far it would move another one if it were locked; error_alone: the error of its lock in a run.
+    predicted: how far it would move another one if it were locked; error_alone: the error of its lock in a
+    run.
     """
 
     joint: str
@@ -83,7 +82,7 @@ class PairRow(Row):
 
 @dataclass
 class LimitRow(Row):
-    """The largest stable step of the whole file and of the smaller one; limit: as in step_limits.csv, or rests_elsewhere."""
+    """The largest stable step of a file; limit: as in step_limits.csv, or rests_elsewhere."""
 
     model: str
     integrator: str
@@ -96,8 +95,8 @@ class LimitRow(Row):
 class FrontierRow(Row):
     """A model with an integrator and a step: time over error, rad or m.
 
-    error_at_own_step: from the file's own run, both by its own step and integrator: of the model alone. best_for: the errors
-    for which it is the answer.
+    error_at_own_step: from the file's own run, both by its own step and integrator: of the model alone.
+    best_for: the errors for which it is the answer.
     """
 
     model: str
@@ -112,16 +111,3 @@ class FrontierRow(Row):
     gain: float = 1.0  # over the file as it is
     stable_at_rest: bool = True  # False: a step of an answer, or one as long, which is not stable there
     best_for: str = ""
-
-
-class Need(NamedTuple):
-    """The joints of a scene."""
-
-    needed: tuple[str, ...]
-    locked: tuple[str, ...]  # as the scene says
-    stays: tuple[str, ...]  # those that can be locked
-
-
-@dataclass
-class ReductionResult(Result):
-    needs: dict[str, Need] = field(default_factory=dict)  # by scene

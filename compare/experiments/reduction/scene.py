@@ -1,4 +1,4 @@
-"""The motions of a file that a smaller model is to repeat: of a keyframe, of recorded controls, or of a user's scenes."""
+"""The motions of a file that smaller models repeat: of a keyframe, recorded controls, a user's scenes."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...engines.mujoco.motion import Motion, Path, Simulation, Use, actuators, apart, data_at, used
+from ...engines.mujoco.motion import Motion, Path, Simulation, Use, apart, data_at, inputs_of, used
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller
 from ...engines.mujoco.step import start_of
@@ -79,29 +79,28 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     points = tuple(request.points.split(",")) if request.points else ()
     whole = Smaller.whole(reading.source, points)
     cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
-    if cases and request.controls:
-        raise ValueError("--controls and --scenes both say what the robot does")
-    motions = [motion_of_case(case, reading) for case in cases]
-    scene = Scene(reading, motions or [motion_of_posture(setup, reading)], whole, points)
+    motions = [motion_of_case(case, reading, whole) for case in cases]
+    scene = Scene(reading, motions or [motion_of_posture(setup, reading, whole)], whole, points)
     paths = scene.run(whole)
     if scene.apart(paths, paths):  # not finite
         raise ValueError(f"the file's own run fails ({reading.integrator}, {1e3 * reading.dt:g} ms)")
     return scene
 
 
-def motion_of_case(case: Case, reading: Reading) -> Motion:
+def motion_of_case(case: Case, reading: Reading, whole: Smaller) -> Motion:
     scene, still = case.scene, np.zeros(reading.model.nv)
     if scene.locked or np.any(scene.damping) or not scene.gravity:
         raise ValueError(f"the scene {scene.name} changes the model: locked, damping or gravity")
     key = scene.posture if isinstance(scene.posture, str) and scene.posture in reading.keyframes else ""
     controls = case.controller.controls if case.controller else ()
-    data = data_at(reading.model, start_of(reading.model, reading.drive, key, still, case.posture, controls))
+    state = start_of(reading.model, reading.drive, key, still, case.posture, controls)
+    data = data_at(reading.model, state, whole.model)
     data.qvel[:] = case.v
     data.qfrc_applied[:] = 0.0 if case.controller else case.tau
-    return Motion(scene.name, scene.duration, data, np.zeros(1), data.ctrl[None].copy())
+    return Motion(scene.name, scene.duration, data, np.zeros(1), inputs_of(data, 1))
 
 
-def motion_of_posture(setup: Setup, reading: Reading) -> Motion:
+def motion_of_posture(setup: Setup, reading: Reading, whole: Smaller) -> Motion:
     """With the recorded controls, if there are any."""
     request = setup.request
     posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
@@ -113,8 +112,6 @@ def motion_of_posture(setup: Setup, reading: Reading) -> Motion:
         place = standing_at(reading, posture)
         if place.left <= NEAR_REST and np.abs(place.moved).max(initial=0.0) <= STANDS:
             state, name = place.rest, f"{name}, at rest"
-    data = data_at(reading.model, state)
-    inputs, places = np.tile(data.ctrl, (len(times), 1)), actuators(reading.model)
-    for actuator, values in recorded.items():
-        inputs[:, places[actuator][0].start] = values
+    data = data_at(reading.model, state, whole.model)
+    inputs = inputs_of(data, len(times)) | {name: values[:, None] for name, values in recorded.items()}
     return Motion(name, float(times[-1]) or DURATION, data, times, inputs)

@@ -1,4 +1,4 @@
-"""The search: what goes for nothing, which joints can be locked for an error, and how fast each model is by each step."""
+"""The search: what goes for nothing, which joints can be locked, how fast each model is by each step."""
 
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -24,7 +24,7 @@ Groups = frozenset[int]  # of joints that are locked, by their numbers
 
 
 def take_out(scene: Scene) -> list[tuple[FreeRow, Smaller]]:
-    """Take out one kind after the other, each only if the motion is the same to the last bit: a row, and the model then."""
+    """Take out one kind after the other if the motion is the same to the last bit: a row, and the model then."""
     paths, small, kinds = scene.run(scene.whole), scene.whole, []
     for kind, edit in FREE.items():
         trial = Smaller(small.spec.copy())
@@ -55,12 +55,12 @@ class Group(NamedTuple):
 def groups_of(scene: Scene, free: Smaller) -> list[Group]:
     """The joints that may be locked.
 
-    The prediction: were the joint locked, the others would be moved by its own movement times their coupling through M.
+    The prediction: were the joint locked, the others would be moved by its own movement times their coupling
+    through M.
     """
     model, use, places = free.model, scene.use, joints(free.model)
-    most = {
-        name: DOES_SLIDE if kind_of(model, number) == "slide" else DOES for number, name in enumerate(places)
-    }
+    slides = [name for number, name in enumerate(places) if kind_of(model, number) == "slide"]
+    most = dict.fromkeys(places, DOES) | dict.fromkeys(slides, DOES_SLIDE)
     costs = couplings(model, scene.positions(free), np.hstack([use.middle[name] for name in places]))
     groups = []
     for names in tied_joints(model):
@@ -92,7 +92,7 @@ class Locks:
             return None
 
     def error_of(self, groups: Groups) -> float:
-        """Of the joints that stay and the points, rad or m, by the file's step; inf where they cannot be locked."""
+        """Of the joints that stay and the points, by the file's step; inf where they cannot be locked."""
         small = self.model(groups)
         if small is None or not small.model.nv:
             return np.inf
@@ -106,7 +106,7 @@ class Locks:
         return frozenset(self.order[:count])
 
     def within(self, allowed: float) -> Groups:
-        """The groups that can be locked for an error: all, or each that the error allows, the one of least cost first."""
+        """The groups that can be locked for an error: all, or each that it allows, the one of least cost first."""
         chosen = self.first(len(self.order))
         if self.error(chosen) <= allowed:
             return chosen
@@ -128,7 +128,7 @@ class Candidate(NamedTuple):
 def frontier(
     scene: Scene, locks: Locks, errors: Sequence[float], quiet: Callable[[], object]
 ) -> list[Candidate]:
-    """Each model by each integrator and step: its error against the reference, and its time; the file as it is first.
+    """Each model by each integrator and step: its error and its time; the file as it is first.
 
     Those that are worse than all of the errors are left out; the file's own step stays.
     """
@@ -150,15 +150,11 @@ def frontier(
             run, is_own = scene.simulation(small, dt, integrator), (integrator, dt) == own
             paths = run()
             row = FrontierRow(
-                model=name,
-                locked=len(locks.positions(groups)),
-                integrator=integrator,
-                dt=dt,
-                error=scene.apart(paths, reference),
-                error_of_model=error_of_model,
+                model=name, locked=len(locks.positions(groups)), integrator=integrator, dt=dt,
+                error=scene.apart(paths, reference), error_of_model=error_of_model,
                 error_of_step=scene.apart(paths, fine),
                 error_at_own_step=locks.error(groups) if is_own else None,
-            )
+            )  # fmt: skip
             if is_own or row.error <= max(errors):
                 candidates.append(Candidate(row, small, groups))
                 runs.append(run)
@@ -202,6 +198,6 @@ def answer_within(rows: Sequence[FrontierRow], allowed: float) -> Answer:
 
 
 def best_of(rows: Sequence[FrontierRow]) -> FrontierRow:
-    """Of those that are as fast as the fastest, within the accuracy of times, the one with most joints locked."""
+    """Of those that are as fast as the fastest, within AS_FAST, the one with most joints locked."""
     fast = max(row.gain for row in rows) / AS_FAST
     return max((row for row in rows if row.gain >= fast), key=lambda row: (row.locked, row.gain))

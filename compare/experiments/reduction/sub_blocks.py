@@ -1,6 +1,6 @@
 """Locked joints: Mbar and the bias of the reduced model compared with the sub-blocks of the whole model."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -18,9 +18,8 @@ from .records import SubsetRow
 
 ALL_SUBSETS = 6  # joints up to which all subsets are locked; above, some joints, each alone
 MOST_TO_LOCK = 2.0  # s that an exact state may take
-Differences = dict[
-    tuple[str, str], tuple[np.ndarray, np.ndarray]
-]  # by quantity and pair: of states, and their scales
+Both = tuple[np.ndarray, np.ndarray]
+Differences = dict[tuple[str, str], Both]  # by quantity and pair: of states, and their scales
 
 
 def compare_blocks(result: Result, setup: Setup, angles: int) -> None:
@@ -60,12 +59,6 @@ def subsets(joints: Sequence[str], most: int) -> list[tuple[str, ...]]:
     return [(name,) for name in joints[:: -(-len(joints) // most)]]
 
 
-def columns_of(smaller: Case, case: Case) -> tuple[np.ndarray, np.ndarray]:
-    """The columns of the smaller case's positions and speeds among those of a case."""
-    joints = [case.coordinates.by_name[name] for name in smaller.joints]
-    return np.r_[tuple(joint.q for joint in joints)], np.r_[tuple(joint.qd for joint in joints)]
-
-
 def check_blocks(result: Result, where: str, row: SubsetRow, apart: np.ndarray, scale: np.ndarray) -> None:
     """A check of the state closest to its tolerance, 64 eps x scale, and the row. apart, scale: (states,)."""
     tolerance = FACTOR * EPS * scale
@@ -82,32 +75,26 @@ def sub_block_differences(setup: Setup, case: Case, q: np.ndarray, v: np.ndarray
 
     The difference of a state is the one closest to its tolerance, with its scale, as in `mass`.
     """
-    q, v = q.copy(), v.copy()
-    for name, position in case.locked.items():
-        joint = case.robot.coordinates.by_name[name]
-        q[:, joint.q], v[:, joint.qd] = position, 0.0
-    positions, speeds = columns_of(case, setup.robot.case())
-    free_q, free_v, scale = q[:, positions], v[:, speeds], Entries(setup.robot.tree, q, v)
-    reduced, unlocked = setup.compared(case).values(), setup.compared().values()
-    block, rows = np.ix_(np.arange(len(q)), speeds, speeds), np.ix_(np.arange(len(q)), speeds)
-    compared = {
-        "Mbar": (
-            [engine.mass_matrix(free_q) for engine in reduced],
-            [engine.mass_matrix(q)[block] for engine in unlocked],
-            scale.mass_matrix[block],
-        ),
-        "bias": (
-            [engine.bias(free_q, free_v) for engine in reduced],
-            [engine.bias(q, v)[rows] for engine in unlocked],
-            scale.bias[rows],
-        ),
+    speeds, states, free_q = case.indices("qd"), np.arange(len(q)), q[:, case.indices("q")]
+    rows, block = np.ix_(states, speeds), np.ix_(states, speeds, speeds)
+    q, free_v, still = case.positions_of_all(free_q), v[rows], np.zeros_like(v)
+    still[rows] = free_v
+    scale = Entries(setup.robot.tree, q, still)
+    of_case, of_whole = setup.compared(case).values(), setup.compared().values()
+    reduced = [(engine.mass_matrix(free_q), engine.bias(free_q, free_v)) for engine in of_case]
+    whole = [(engine.mass_matrix(q)[block], engine.bias(q, still)[rows]) for engine in of_whole]
+    pairs = {
+        "TMT, reduced to whole": (reduced[0], whole[0]),
+        "MuJoCo, reduced to whole": (reduced[1], whole[1]),
+        "reduced, TMT to MuJoCo": (reduced[0], reduced[1]),
     }
-    differences = {}
-    for quantity, (smaller, whole, entries) in compared.items():
-        for pair, apart in (
-            ("TMT, reduced to whole", smaller[0] - whole[0]),
-            ("MuJoCo, reduced to whole", smaller[1] - whole[1]),
-            ("reduced, TMT to MuJoCo", smaller[0] - smaller[1]),
-        ):
-            differences[quantity, pair] = worst_of_each(apart, entries)
-    return differences
+    return differences(pairs, (scale.mass_matrix[block], scale.bias[rows]))
+
+
+def differences(pairs: Mapping[str, Sequence[Both]], scales: Both) -> Differences:
+    """Of pairs of Mbar and the bias at states, by the pairs' names; scales: of the entries of both."""
+    found: Differences = {}
+    for place, quantity in enumerate(("Mbar", "bias")):
+        for name, (values, others) in pairs.items():
+            found[quantity, name] = worst_of_each(values[place] - others[place], scales[place])
+    return found

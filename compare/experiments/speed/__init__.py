@@ -43,10 +43,9 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     loops = evaluations.loops(setup)
     add_times(setup, scenes)
     result = judged(setup, scenes)
-    if settings := conclusions.cheapest_settings(result):
-        values = {"settings": settings, **conclusions.target(result)}
-        result.headline = result.finding("headline", **values)
-        result.top.append(result.finding("answer", **values))
+    cheapest = conclusions.cheapest_settings(result)
+    if cheapest["settings"]:
+        result.headline = result.finding("headline", **cheapest)
     result.tables["what_should_i_use"] = conclusions.advice(result)
     result.find("columns")
     setup.progress("speed: one evaluation")

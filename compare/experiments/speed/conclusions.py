@@ -67,7 +67,7 @@ def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
 
 
 def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
-    """MuJoCo's integrators and the same schemes in tmt make the same error, except for rounding: half an eps a step."""
+    """MuJoCo's integrators and the same schemes in tmt make the same error, up to half an eps a step."""
     by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
     for run in scene.runs:
         mujoco, twin = run.row, by_tmt.get((run.method.scheme, run.row.dt))
@@ -170,11 +170,6 @@ def ratio(slow: SpeedRow | None, fast: SpeedRow | None) -> float | None:
     return slow.time / fast.time if slow and fast else None
 
 
-def target(result: SpeedResult) -> dict[str, Any]:
-    """What the sentences about the cheapest setting of the first screen say of the run."""
-    return {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off, "target": TARGET}
-
-
 def front(rows: Sequence[SpeedRow]) -> list[SpeedRow]:
     """The rows than which no other is both faster and more exact, from the fastest to the most exact."""
     best: list[SpeedRow] = []
@@ -199,9 +194,10 @@ def reaching(rows: Sequence[SpeedRow], target: float) -> list[SpeedRow]:
     return [row for row in rows if row.largest_error <= target]
 
 
-def cheapest_settings(result: SpeedResult) -> list[SpeedRow]:
-    """For TARGET where errors are regular: the cheapest of all engines, and of MuJoCo (of tmt, if MuJoCo's is the first)."""
+def cheapest_settings(result: SpeedResult) -> dict[str, Any]:
+    """For TARGET where errors are regular: the cheapest of all engines and of MuJoCo (else tmt)."""
     reach = reaching([row for row in result.rows if row.scene == result.regular], TARGET)
     first = cheapest(reach)
     other = "tmt" if first and first.engine == "mujoco" else "mujoco"
-    return [row for row in (first, cheapest(reach, other)) if row]
+    about = {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off, "target": TARGET}
+    return about | {"settings": [row for row in (first, cheapest(reach, other)) if row]}

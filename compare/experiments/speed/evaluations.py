@@ -43,7 +43,7 @@ class Loop(NamedTuple):
 
 def loops(setup: Setup) -> list[Loop]:
     """All ways, compiled and not yet timed; of MuJoCo none where its library is not found."""
-    from ...engines.mujoco.calls import MinimalCalls  # here, as importing MuJoCo takes long
+    from ...engines.mujoco import calls  # here, as importing MuJoCo takes long
     from ...engines.mujoco.dynamics import MujocoDynamics
 
     tree, coordinates = setup.robot.tree, setup.robot.coordinates
@@ -51,10 +51,9 @@ def loops(setup: Setup) -> list[Loop]:
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
     ready = at_many_states(tree, *(values[:FEW] for values in states))
-    if not MinimalCalls.unavailable():
-        dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
-        of_mujoco = MinimalCalls(dynamics).loops(*(values[0] for values in states)).items()
-        ready += [Loop(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
+    dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
+    of_mujoco = calls.loops(dynamics, *(values[0] for values in states)).items()
+    ready += [Loop(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
     for loop in ready:
         loop.run(1)  # its code is compiled, or loaded, on the first call
     return ready + (at_many_states(tree, *states) if many > FEW else [])

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import cycle
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -11,7 +10,7 @@ from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
 from ..figures import chart
-from .conclusions import TARGET, best_rows, cheapest, cheapest_settings, front, reaching, target
+from .conclusions import TARGET, best_rows, cheapest, cheapest_settings, front, reaching
 from .runs import SpeedResult, SpeedRow
 
 METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
@@ -39,9 +38,11 @@ def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[st
     ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
     ax.minorticks_off()
     fig.legend(loc="outside right upper", fontsize=7, handlelength=1.6)
-    counts = {"diverged": sum(bool(row.diverged) for row in ran), "missing": len(ran) - len(good)}
-    values: dict[str, Any] = {"begins": beginning or scene, "unit": unit, "end": COARSE_END, **counts}
-    return file_name("speed", scene), fig, result.finding("times", **values)
+    caption = result.finding(
+        "times", begins=beginning or scene, unit=unit, end=COARSE_END,
+        diverged=sum(bool(row.diverged) for row in ran), missing=len(ran) - len(good),
+    )  # fmt: skip
+    return file_name("speed", scene), fig, caption
 
 
 def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
@@ -63,5 +64,4 @@ def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
     ax.invert_xaxis()
     ax.margins(0.06, 0.12)
     fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
-    caption = result.finding("overview_caption", settings=cheapest_settings(result), **target(result))
-    return "overview_times", fig, caption
+    return "overview_times", fig, result.finding("overview_caption", **cheapest_settings(result))

@@ -20,7 +20,7 @@ from .subjects import DAMPINGS, SCHEMES, coarsest_case, methods_of, subjects_of,
 from .tables import LimitRow, StabilityResult
 
 EXPERIMENT = Experiment(
-    order=100, serves_own=False, overview="limits",
+    order=100, serves_own=False, overview="limits", first_screen=("answer", "cures", "control"),
     options=("--dt", "--integrator", "--posture", "--control-period", "--delay", "--kp", "--kv", "--at-speed"),
 )  # fmt: skip
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step

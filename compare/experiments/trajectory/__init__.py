@@ -99,6 +99,12 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
     errors.find_departures(result, robot)
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
+    beginnings: dict[tuple[str, float], list[str]] = {}
+    for row in result.of_beginnings:
+        if row.level == "open loop":
+            beginnings.setdefault((row.scene, row.dt), []).append(row.engine_integrator)
+    if beginnings:
+        result.find("beginnings", runs=beginnings)
     result.notes += work.left_out
     if few := few_integrators(setup):
         result.find("few_integrators", integrators=few, speeds=FEW_SPEEDS)

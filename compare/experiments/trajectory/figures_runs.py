@@ -192,7 +192,9 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
         if share is not None:
             lines_to(left, [share], [place], mark, colour, markersize=4.5)
     durations = [case.duration for name in shown for case in robot.cases if case.name == name]
-    judged = [min(row.judged_until for row in rows[name]) for name in shown]
+    beginnings = result.of_beginnings
+    until = {name: [row.judged_until for row in rows[name] if row not in beginnings] for name in names}
+    judged = [min(until[name], default=0.0) for name in shown]
     places = range(len(shown))
     right.barh(places, durations, height=0.5, color=(GREY, 0.2), label="not judged")
     right.barh(places, judged, height=0.5, color=BLUE, label="judged at all dt")
@@ -204,9 +206,9 @@ def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Fi
     left.tick_params(axis="y", labelsize=8)
     right.grid(axis="y", visible=False)
     fig.legend(loc="outside upper center", ncols=2, fontsize=7)
-    until = [row.judged_until for name in names for row in rows[name]]
+    beginning = sorted({row.engine_integrator for row in beginnings})
     caption = result.finding(
         "overview_caption", label=result.label, share=largest_known([*shares.values()]), scenes=len(names),
-        failing=failing, shortest=min(until), longest=max(until),
+        failing=failing, times=sorted({time for times in until.values() for time in times}), beginning=beginning,
     )  # fmt: skip
     return "overview_scenes", fig, caption

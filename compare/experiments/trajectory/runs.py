@@ -16,12 +16,13 @@ from ...judge import run as rules
 from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
 from ...robots.coordinates import rates_at
+from ...robots.file import steps_afforded
 from ..followed import Deviation, check_closest, differences, one_step
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
-MOST_ENTRIES = 2_700_000  # of all Jacobians of a run, which take the time
 # decay rate times dt up to which RK4 is stable: beyond, each stage multiplies the rounding of the one before
 FASTEST = 2.785
+BEARABLE = 2.0  # the fastest rate times dt up to which every scheme is stable, about
 RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 
 
@@ -122,20 +123,21 @@ class TrajectoryResult(Result):
     # of each scene whose true motion is known: the largest error of both engines, rad or m
     errors: dict[str, tuple[float | None, float | None]] = field(default_factory=dict)
 
+    @property
+    def of_beginnings(self) -> list[TrajectoryRow]:
+        """The rows of runs that have the beginning of a scene alone."""
+        to_end = {(run.case.name, run.dt) for run in self.runs}
+        return [row for row in self.rows if (row.scene, row.dt) not in to_end]
+
     def run_of(self, case: Case, *schemes: str) -> Run | None:
         """The run of a case with its own step by one of these schemes."""
         of_case = [run for run in self.runs if (run.case.name, run.steps) == (case.name, case.steps)]
         return next((run for run in of_case if run.scheme in schemes), None)
 
 
-def steps_afforded(case: Case) -> int:
-    """The steps of a run for which its band is computed: each has a Jacobian of (2 nv)^2 entries."""
-    return MOST_ENTRIES // (2 * case.coordinates.nv) ** 2
-
-
 def step_counts(case: Case, finer: Sequence[int]) -> list[int]:
     """The numbers of steps of a case's runs: its own, and multiples of it up to 8192 and steps_afforded."""
-    most = min(STEPS_AT_MOST, steps_afforded(case))
+    most = min(STEPS_AT_MOST, steps_afforded(case.coordinates.nv))
     return [case.steps * multiple for multiple in finer if multiple == 1 or case.steps * multiple <= most]
 
 
@@ -165,10 +167,25 @@ def follow(
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
             for scheme, methods in schemes.items():
-                twin = run_of_twin(case, dynamics[first], steps, scheme)
+                stable = stable_part(case, scheme)
+                twin = run_of_twin(stable, dynamics[first], steps, scheme)
                 runs = [compare_run(result, twin, dynamics[mujoco], method) for method in methods]
-                result.runs.append(runs[0])
+                if stable is case:
+                    result.runs.append(runs[0])
     return result
+
+
+def stable_part(case: Case, scheme: str) -> Case:
+    """The case; in a scene of a file whose step the scheme does not bear, its beginning, with a step that it bears.
+
+    The forces of springs limit every scheme, those of damping RK4, and those of servos Euler, too.
+    """
+    stepping, (decay, frequency) = METHODS[scheme], rates_at(case.tree, case.q)
+    has_damping = not case.tree.has_gains or getattr(stepping, "implicit_gains", False)
+    rate = frequency if has_damping and stepping.stages == 1 else max(decay, frequency)
+    if "user" in case.scene.tags or not case.robot.is_read or rate * case.scene.dt <= BEARABLE:
+        return case
+    return case.changed(duration=case.steps / rate, dt=1.0 / rate)
 
 
 def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin:
@@ -177,7 +194,7 @@ def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin
     dt, every = case.duration / steps, steps // recorded(case)
     motion = dynamics.run(*case.start, tau, dt, steps, scheme)
     path = Path.of(case, motion)
-    width = band(stepping, tree, path.q, path.v, tau, dt, every, steps_afforded(case))
+    width = band(stepping, tree, path.q, path.v, tau, dt, every, steps_afforded(case.coordinates.nv))
     alive = motion.t[::every] < ends_first([path.ended])
     states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
     stepped = one_step(dynamics, states, tau, dt, scheme)

@@ -2,7 +2,7 @@
 
 import pytest
 from edited import XML, setup_of
-from small_runs import InProcess, Lines
+from in_process import InProcess, Lines
 
 from compare.core.check import Result
 from compare.core.text import say
@@ -58,7 +58,7 @@ def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_
     # not by parameters, but in the values
     monkeypatch.setattr(parameters, "rows", lambda setup: Result("parameters"))
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
-    sections, causes, reasons = experiment.examine(names, setup, tmp_path, Lines(), InProcess())
+    sections, causes, reasons = experiment.Run(names, setup, tmp_path, Lines(), InProcess()).examined()
     assert [section.name for section in sections] == made
     assert list(reasons) == [name for name in names if name not in made]
     assert [cause.place for cause in causes] == found

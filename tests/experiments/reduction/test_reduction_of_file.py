@@ -12,6 +12,7 @@ from edited import setup_of_file
 
 import tmt
 from compare.cli.command_line import request
+from compare.core.check import Result
 from compare.core.text import say
 from compare.engines.mujoco import ModelError
 from compare.engines.mujoco.motion import Simulation
@@ -21,7 +22,7 @@ from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
 from compare.experiments.reduction.limits import compared_limits, stable_answers
-from compare.experiments.reduction.records import FrontierRow, ReductionResult
+from compare.experiments.reduction.records import FrontierRow
 from compare.experiments.reduction.scene import scene_of
 from compare.experiments.reduction.search import answer_within, take_out
 from compare.experiments.setup import Request
@@ -51,7 +52,8 @@ HAND = f"""<mujoco><option integrator="implicitfast"/><worldbody><body><joint na
 <position name="thumb" tendon="thumb" kp="5"/></actuator></mujoco>"""
 TUMBLES = """<mujoco><worldbody><geom type="plane" size="3 3 0.1"/><body pos="0 0 0.3" euler="20 30 0"><freejoint/>
 <geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
-# it sinks a little to its rest: a box on a plate with a spring
+
+
 STANDS = """<mujoco><worldbody><body pos="0 0 1"><joint name="{0}" type="slide" axis="0 0 1" stiffness="{1}" damping="100"/>
 <geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody></mujoco>"""
 
@@ -71,8 +73,8 @@ def waves(*names):
     return {"time": times} | {name: 0.3 * np.sin(2.0 * np.pi * times) for name in names}
 
 
-def answered(xml, **request) -> ReductionResult:
-    setup, result = setup_for(xml, **request), ReductionResult("reduction")
+def answered(xml, **request) -> Result:
+    setup, result = setup_for(xml, **request), Result("reduction")
     of_file.add(result, setup, setup.reading)
     return result
 
@@ -162,7 +164,7 @@ def test_a_reduction_holds_in_all_of_the_scenes(tmp_path):
     both = SCENES.format("left", "20, 0, 0, 0") + SCENES.format("right", "0, 0, 20, 0")
     for scenes in (both, both.partition('"right')[0].rpartition("[[")[0]):
         path.write_text(scenes)
-        setup, result = setup_for(TWO_ARMS, write=str(written)), ReductionResult("reduction")
+        setup, result = setup_for(TWO_ARMS, write=str(written)), Result("reduction")
         setup = replace(setup, robot=setup.robot.with_scenes(read_scenes(path, setup.robot)))
         of_file.add(result, setup, setup.reading)
         assert [str(check) for check in result.checks if not check.passed] == []
@@ -194,13 +196,16 @@ def test_the_written_file_is_moved_with_its_meshes(tmp_path):
     assert "smaller_assets" in say(result.top[0])
 
 
-@pytest.mark.parametrize(
-    "place, message", [("arms.xml", "of the robot itself"), ("none/small.xml", "no such folder")]
-)
-def test_what_cannot_be_written_is_refused_at_once(tmp_path, place, message):
+@pytest.mark.parametrize("option, value, message", [
+    ("--write", "{}/arms.xml", "of the robot itself"), ("--write", "{}/none/small.xml", "no such folder"),
+    ("--write", "{}", "it is a folder"), ("--points", "nothing", "no body and no site 'nothing'"),
+])  # fmt: skip
+def test_what_the_file_does_not_have_or_cannot_be_written_is_refused_at_once(
+    tmp_path, option, value, message
+):
     path = tmp_path / "arms.xml"
     path.write_text(TWO_ARMS)
-    options = request(["reduction", "--mjcf", str(path), "--write", str(tmp_path / place)])
+    options = request(["reduction", "--mjcf", str(path), option, value.format(tmp_path)])
     with pytest.raises(ModelError, match=message):
         compared_with(None, str(path)).request_of(options)
 
@@ -223,14 +228,6 @@ def test_a_body_that_is_moved_from_outside_is_where_the_keyframe_has_it(tmp_path
         turned.append(data.joint("arm").qpos[0])
     assert turned[0] == pytest.approx(turned[1], abs=1e-3) and turned[0] < -0.5
     assert model.njnt == 1
-
-
-def test_what_the_scene_used_is_a_table(two_arms):
-    use = {row.part: row for row in two_arms[0].tables["reduction_use"]}
-    assert (use["actuators"].in_file, use["actuators"].used) == (5, 2)
-    assert (use["joints that move"].in_file, use["joints that move"].used) == (4, 2)
-    assert (use["geoms that touch"].in_file, use["geoms that touch"].used) == (6, 0)
-    assert use["sensors"].in_file == 1
 
 
 def test_each_kind_is_taken_out_of_what_the_kinds_before_it_have_left(two_arms):
@@ -258,7 +255,7 @@ def test_the_equations_of_the_smaller_model_are_those_of_tmts_lock(two_arms):
     where = "home, joints locked: 2"
     quantities = {check.quantity for check in result.checks if check.scene == where}
     assert quantities == {f"{name}, lock of tmt to the smaller model" for name in ("Mbar", "bias")}
-    whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, ReductionResult("reduction")
+    whole, written, elsewhere = read(Source(TWO_ARMS)).tree, read(path).tree, Result("reduction")
     of_file.compare_locked(elsewhere, where, whole.lock({"right upper": 1.0, "left lower": 0.0}), written)
     assert not any(check.passed for check in elsewhere.checks)
 
@@ -272,7 +269,7 @@ def test_a_file_beyond_the_error_fails(two_arms):
     for share, free, written, passed in (
         (1.01, arms.whole, arms.whole, True), (0.99, heavier, arms.whole, False), (1.01, heavier, heavier, False),
     ):  # fmt: skip
-        result = ReductionResult("reduction")
+        result = Result("reduction")
         answer = SimpleNamespace(row=row, allowed=share * row.error, at_own_step=False)
         of_file.add_checks(result, arms, free, {}, answer, arms.whole, written)
         verdicts = {check.quantity: check.passed for check in result.checks}
@@ -309,18 +306,6 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
     )
     steps = [row for row in result.tables["reduction_frontier"] if row.error_of_step != row.error]
     assert steps and all(row.locked for row in steps)  # of the others the whole error is that of the step
-
-
-def test_errors_of_the_model_and_of_the_step_are_no_parts_of_the_whole(two_arms):
-    """They may cancel each other."""
-    (top, *_), path = two_arms[0].top, two_arms[1]
-    facts = top.values["facts"]
-    row = replace(facts["chosen"].row, error=4e-3, error_of_model=6e-3, error_of_step=2e-3)
-    told = say(
-        replace(top, values={"facts": facts | {"chosen": facts["chosen"]._replace(allowed=1e-2, row=row)}})
-    )
-    assert "error 4 mrad (of the model alone 6 mrad, of the step alone 2 mrad)" in told
-    assert "of that" not in told + path.read_text(encoding="utf-8")
 
 
 def test_after_a_joint_that_costs_too_much_others_are_tried():
@@ -372,20 +357,6 @@ def test_no_answer_is_a_step_that_is_unstable_at_rest():
     assert 1e-3 <= answer.row.dt < limit.step < 2.0 * answer.row.dt
 
 
-def test_bodies_that_the_file_fuses_are_fused_in_the_smaller_one_too():
-    """As those of a URDF: the whole file has one body less than is read of it."""
-    tool = '<body pos="0 0 -0.1"><inertial pos="0.1 0 0" mass="2" diaginertia="0.1 0.2 0.3"/><geom size="0.01"/></body>'
-    fused = TWO_ARMS.replace("<mujoco>", '<mujoco><compiler fusestatic="true"/>').replace(
-        '<site name="left', tool + '<site name="left'
-    )
-    result = answered(fused, controls=waves("left upper"))
-    assert [str(check) for check in result.checks if not check.passed] == []
-    assert {row.joint for row in result.tables["reduction_joints"] if row.locked} >= {
-        "right upper",
-        "right lower",
-    }
-
-
 def many_legs(rng):
     """A free trunk with 24 legs."""
     legs = "".join(
@@ -412,7 +383,7 @@ def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
     smaller = read(small.model).tree
     heavier = replace(smaller, mass=tuple((1.0 + 1e-11) * mass for mass in smaller.mass))
     for other, passed in ((smaller, True), (heavier, False)):
-        result = ReductionResult("reduction")
+        result = Result("reduction")
         of_file.compare_locked(result, "legs locked", locked, other)
         assert all(check.passed for check in result.checks) is passed
 

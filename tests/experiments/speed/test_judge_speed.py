@@ -1,7 +1,5 @@
 """What is concluded from errors, orders and times, every rule with a row just inside and one just outside; what is timed."""
 
-import time
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 from compare.core.rows import Row
 from compare.core.text import say
 from compare.engines import Method, Setting
-from compare.experiments import speed
 from compare.experiments.speed import conclusions, evaluations, runs
 from compare.experiments.speed.runs import Run, SceneRuns, SpeedResult, SpeedRow
 
@@ -58,12 +55,6 @@ def test_the_same_scheme_makes_the_same_error(ours, theirs, verdict):
     assert judged(conclusions.check_same_schemes, found, 1e-10) == expected
 
 
-@pytest.mark.parametrize("difference, passes", [(127e-10, True), (129e-10, False)])
-def test_each_of_many_steps_may_round_by_half_an_eps(difference, passes):
-    found = [run_of("tmt", "rk4", 1e-3, 256), run_of("mujoco", "RK4", 1e-3 + difference, 256)]
-    assert [*judged(conclusions.check_same_schemes, found, 1e-10).values()] == [passes]
-
-
 @pytest.mark.parametrize("theirs, ours, left, found", [
     # errors that have stopped are of the size of rounding
     ([1e-6, 1e-14, 2e-14], [1e-6, 1e-14], 1e-14 / 63, {STOPPED: True, COMPARED: True}),
@@ -82,14 +73,6 @@ def test_each_of_many_steps_may_round_by_half_an_eps(difference, passes):
 def test_smallest_errors(theirs, ours, left, found):
     measured = series("mujoco", "RK4", theirs) + series("tmt", "rk4", ours)
     assert judged(conclusions.check_smallest_errors, measured, left) == found
-
-
-@pytest.mark.parametrize("found, work, best, last, ends", [
-    (0.71e-14, 121, 1e-14, 100, True), (0.69e-14, 121, 1e-14, 100, False), (0.71e-14, 119, 1e-14, 100, False),
-    (29e-15, 200, 29e-15, 100, True), (31e-15, 200, 31e-15, 100, False), (np.nan, 200, 1e-15, 100, True),
-])  # fmt: skip
-def test_a_series_ends_where_a_run_gains_nothing(found, work, best, last, ends):
-    assert runs.gained_nothing(found, work, best, last, 1e-15) is ends
 
 
 def falling(*orders) -> list[float]:
@@ -174,30 +157,3 @@ def test_a_row_gets_the_least_of_its_times(monkeypatch):
     monkeypatch.setattr(runs.timing, "in_turns", lambda calls, rounds: [[3e-3, 2e-3, 5e-3], [0.2]])
     runs.take_times(found, [(None, 1.0), (None, 2.0)])
     assert [run.row.seconds for run in found] == [2e-3, 0.4]
-
-
-def test_what_is_timed_in_part_counts_as_the_whole(setup, monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(time, "perf_counter", lambda: now[0])
-    found = [run_of("mujoco", "RK4", 1.0, 16384), run_of("tmt", "rk4", 1.0, 16384)]
-
-    def call():
-        now[0] += 0.5
-
-    calls = [(call, longer) for _, longer in runs.prepared(setup.robot.cases[0], found, setup.engines)]
-    runs.take_times(found, calls)
-    assert [run.row.seconds for run in found] == pytest.approx([16.0, 0.5])
-    assert [run.row.timed_steps for run in found] == [512, 16384]
-
-
-def test_what_is_called_is_followed_once_after_all_else_has_ended(setup, monkeypatch):
-    log, setup = [], replace(setup, quiet=lambda: log.append("quiet"))
-    known, called = run_of("tmt", "rk4", 1.0), [run_of("scipy", "RK45", 1.0, 64, s) for s in (0.014, 0.016)]
-    follow = lambda *_, compiled: log.append(compiled) or called  # noqa: E731
-    take = lambda runs, calls: log.append(runs == calls == [known, called[0]])  # noqa: E731
-    acts = {"runs_of": follow, "prepared": lambda case, runs, engines: runs, "take_times": take}
-    for name, act in acts.items():
-        monkeypatch.setattr(speed, name, act)
-    scene = SceneRuns(setup.robot.cases[0], None, 0.0, [known])
-    speed.add_times(setup, [scene])
-    assert log == ["quiet", False, True] and scene.runs == [known, *called]

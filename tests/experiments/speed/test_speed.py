@@ -8,7 +8,6 @@ from edited import XML, setup_of, setup_of_file, untimed_speed
 from models import PATHS
 
 import tmt
-from compare.engines import RECORDS, Method, Setting
 from compare.engines.heyoka import Heyoka
 from compare.experiments import speed
 from compare.experiments.setup import Setup
@@ -47,15 +46,6 @@ def test_scenes_are_those_with_the_tag_and_a_users_own():
     assert speed.skipped(dataclasses.replace(ARM, scenes=())).kind == "no_scene"
 
 
-def test_methods_are_those_of_the_engines_that_are_there(engines):
-    full, quick, small = (settings.methods(engines, size, BENT) for size in ("full", "quick", "small"))
-    there = [engine for engine in engines.values() if engine.unavailable() is None]
-    # of those that read the file: the experiment `engines`
-    there = [engine for engine in there if not RECORDS[engine.name].reads_file]
-    assert full == small == [method for engine in there for method in engine.methods.values()]
-    assert quick == [m for m in full if m.engine in ("mujoco", "tmt")] and len(quick) < len(full)
-
-
 def test_a_step_response_is_followed_from_coarse_steps_on_by_the_schemes_that_it_has():
     stiff = ARM7.robot.cases[-1]
     assert settings.coarsest_steps(stiff) == 64 < stiff.steps and settings.coarsest_steps(FREE) == FREE.steps
@@ -73,33 +63,6 @@ def test_what_takes_too_long_is_left_out(engines):
     assert slow and not taken & set(slow)
     slow = [settings.left_out(engines, size, ARM7.robot) for size in ("quick", "full")]
     assert [("tmt", "implicit_midpoint") in of_size for of_size in slow] == [True, False]
-
-
-@pytest.mark.parametrize("engine, name, finest", [
-    ("mujoco", "Euler", 2**15), ("mujoco", "RK4", 2**16), ("tmt", "rk4", 2**18), ("tmt", "gauss_legendre_4", 2**15),
-    ("another", "RK4", 2**15),
-])  # fmt: skip
-def test_steps_are_halved_from_the_scenes_own_to_the_finest(engine, name, finest):
-    method = Method(engine, name, 4, "rk4")
-    found = settings.settings_of(method, BENT)
-    assert [s.steps for s in found] == [64 << k for k in range(len(found))] and found[-1].steps == finest
-    assert settings.settings_of(method, BENT, "quick") == found[: 2 if engine == "another" else 5]
-    adaptive = settings.settings_of(method._replace(name="Radau", adaptive=True), BENT)
-    assert [s.tolerance for s in adaptive] == [1e-2, 1e-3, 1e-4]
-
-
-def test_every_method_follows_the_scene(engines, of_bent):
-    """Each method with a fine setting is near the reference, and costs evaluations; one that diverges has no error."""
-    for method in settings.methods(engines, "full", BENT):
-        steps = None if method.adaptive else 2**13 if method.order == 1 else 1024
-        setting = Setting(5.0, steps, 1e-5 if method.adaptive else None)
-        row = runs.measured(of_bent, engines[method.engine], method, setting).row
-        tolerance = {1: 0.6, 2: 0.03, None: 1e-3}.get(method.order, 1e-4)
-        assert 0.0 < row.error <= row.worst_error < tolerance and not row.diverged, method
-        assert row.energy_error > 0.0 and row.dt == (5.0 / steps if steps else None)
-    method = engines["tmt"].methods["explicit_euler"]
-    row = runs.measured(of_bent, engines["tmt"], method, Setting(5.0, 64)).row
-    assert row.diverged and row.error is row.worst_error is row.energy_error is None
 
 
 def test_rounding_leaves_eps_times_the_growth(engines):
@@ -149,15 +112,6 @@ def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engine
     checks = untimed_speed(setup_of(XML.replace('mass="1.5"', 'mass="1.50001"'))).checks
     failed = {check.quantity.partition(",")[0] for check in checks if not check.passed}
     assert {"smallest error of MuJoCo's RK4", "the same error as tmt's rk4"} <= failed
-
-
-def test_a_reference_in_doubles_measures_turns_and_no_quaternions():
-    case = settings.regular_of(setup_of_file(PATHS["free_body"]).robot)
-    known = reference.in_doubles(case)
-    position = known.high[:, :7] * [1, 1, 1, -1, -1, -1, -1]  # -q is the same turn
-    assert known.error(position).max() < 1e-15
-    turned = case.coordinates.move(known.high[:, :7], [0.0, 0.0, 0.0, 0.0, 1e-3, 0.0])
-    assert known.error(turned) == pytest.approx(1e-3)
 
 
 def test_whether_servos_are_off_is_known(engines):

@@ -9,7 +9,6 @@ from compare.engines.tmt import Tmt
 from compare.experiments.stability import claims, departure, equilibria, limits
 from compare.experiments.stability.tables import ClaimRow, DepartureRow, LimitRow
 from compare.robots.arm import ARM
-from compare.stability.held import held
 
 RK4 = (Tmt().methods["rk4"], INTEGRATORS["RK4"])
 NAMES = (*(f"{claims.VARIANT} {k}" for k in range(1, 28)), claims.NEAREST, *claims.CLEAR_TORQUES)
@@ -55,12 +54,6 @@ def test_when_a_deviation_grows(early, late, grown):
     assert limits.grows(np.array([0.5, early]), np.array([0.4, late])) is grown
 
 
-def test_a_slow_mode_that_does_not_grow_by_itself_is_not_seen_in_a_short_run():
-    rates = np.array([3.0j, 0.01j, -0.01, 0.01, -50.0])
-    np.testing.assert_array_equal(limits.is_seen(rates, 1e-6, 10.0), [True, False, False, True, True])
-    assert limits.is_seen(np.array([0.01j]), 1e-6, 10.0).all()  # there is no other
-
-
 def departure_row(observed, predicted, **more):
     usual = {"scene": "ball catch", "engine": "tmt", "method": "rk4", "dt": 0.01, "perturbation": 1e-6}
     return DepartureRow(**usual | {"predicted": predicted, "observed": observed} | more)
@@ -79,24 +72,6 @@ def test_departure_within_one_step_or_three_hundredths(result, observed, predict
 def test_the_largest_difference_of_a_departure_is_reported():
     rows = [departure_row(1.01, 1.0), departure_row(2.02, 2.0, engine="mujoco"), departure_row(3.0, 3.0)]
     assert departure.departure_values(rows) == {"count": 3, "close": 3, "worst": pytest.approx(0.02)}
-
-
-def test_the_linear_map_says_when_a_tenth_of_a_radian_is_reached():
-    at, size = held(ARM, "ball catch"), 1e-4
-    values, vectors = at.modes
-    shape = size * vectors[:3, 0].real / np.abs(vectors[:3, 0]).max()
-    (found,) = departure.predicted(at, "rk4", 1e-3, shape[None], np.zeros((1, 3)))
-    left = np.arccosh(0.1 / size + 1.0) / values[0].real  # cosh - 1, from rest
-    assert found == pytest.approx(left, abs=2e-3)
-
-
-@pytest.mark.parametrize("joints, reach, count", [(4, 2, 625), (5, 1, 243)])
-def test_torques_within_some_ulps_are_bounded_in_number(joints, reach, count):
-    tau = np.linspace(-3.0, 5.0, joints)
-    found = departure.variants(tau, reach)
-    assert found.shape == (count, joints) and (found[count // 2] == tau).all()
-    away = np.abs(found - tau) / np.spacing(np.abs(tau))
-    assert len({tuple(row) for row in found}) == count and (away.max(axis=0) == reach).all()
 
 
 def torque_rows(times=(4.7, 4.7), moved=0.0, sides=(1, 1), clear=(1, 1), leaving=27):

@@ -65,14 +65,6 @@ def test_of_many_keyframes_the_first_are_looked_at():
     assert not subjects_of(body).centres and held(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
 
 
-def test_a_limit_is_sought_about_the_predicted_one_and_found_again():
-    setup = setup_of_file(SWING.format(keys=""))
-    at, known = held(setup.robot, "qpos0"), setup.engines
-    predicted, rk4 = at.limit("rk4")[1], known["mujoco"].methods["RK4"]
-    seen, observed = limits.observed_limit(rk4, known, at, 1000, predicted * limits.TRIED_ABOUT)
-    assert seen == "finite" and observed == pytest.approx(predicted, rel=1e-3)
-
-
 def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(result):
     setup = setup_of_file(CART_POLE)
     robot, known = setup.robot, setup.engines
@@ -96,23 +88,6 @@ def test_predicted_and_observed_limits_agree(engines):
     # growth beyond the limit is slow with little damping: 100-fold in 2000 steps comes 6 % later
     ((row, kind, _),) = limits.limit_rows(held(ARM, "bent", 0.5), engines, (METHODS["explicit_euler"],))
     assert kind == "finite" and row.observed_dt == pytest.approx(row.predicted_dt, rel=5e-4)
-
-
-def test_departure_is_predicted_where_no_other_mode_grows_faster(engines, result):
-    rows = departure.departures(5 / 64, BALL, engines, (METHODS["rk4"], OF_MUJOCO["Euler"]))
-    assert len({row.observed for row in rows}) > 8  # the arm left, at other times from other starts
-    departure.check_departures(result, rows)
-    assert len(result.checks) == len(rows) and all(check.passed for check in result.checks)
-    # with steps of 1 s a swing grows 9.5-fold in each, what leaves 8.5-fold
-    assert departure.departures(1.0, BALL, engines, (METHODS["explicit_euler"],)) == []
-
-
-def test_own_bias_holds_for_ever(engines):
-    tau = departure.own_torque(OF_MUJOCO["RK4"], engines, BALL)
-    assert not engines["mujoco"].of(BALL.case).run(BALL.q, np.zeros(3), tau, 5 / 64, 200, "RK4").v.any()
-    ours = METHODS["rk4"]  # no double need be the bias of compiled code: the nearest is taken
-    left = departure.residual(ours, engines, BALL, departure.own_torque(ours, engines, BALL)[None])
-    assert np.abs(left).max() <= np.spacing(np.abs(BALL.tau).max())
 
 
 def test_the_clear_torques_push_as_much_as_sixteen_ulps(engines):

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,21 +11,17 @@ from servo_models import INERTIA
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
 from compare.core.text import say
 from compare.engines.mujoco.names import INTEGRATORS
-from compare.engines.mujoco.reading import read
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
 from compare.experiments.stability import figures_stability, of_file
 from compare.experiments.stability.of_file import MODES, PUSHED
-from compare.stability.answer import Asked, PlaceAnswer, StepLimitRow
-from compare.stability.cures import Cure
-from compare.stability.place import posture_of, standing_at
+from compare.stability.answer import StepLimitRow
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.05 0.05 0.05"/></body></worldbody><actuator>{actuator}</actuator>
   <keyframe><key name="home" qpos="0.1"/><key name="spin" qvel="3"/></keyframe></mujoco>"""
 SERVO, MOTOR = '<position joint="turn" kp="20" kv="5"/>', '<motor joint="turn"/>'
 LIMIT = (-5.0 + (25.0 + 4.0 * INERTIA * 20.0) ** 0.5) / 20.0  # s, of Euler: 17.5 ms
-NONE = {"limit": "none", "predicted_dt": None}
 
 
 def step_row(**more):
@@ -47,15 +42,6 @@ def judged(result, rows):
 ])  # fmt: skip
 def test_growth_in_closed_form_within_a_ten_thousandth(result, growth, apart, passes):
     assert judged(result, [step_row(growth=growth, apart=apart)])[MODES, "p, contact, Euler"] is passes
-
-
-@pytest.mark.parametrize("more, passed", [
-    ({}, True), ({"predicted_dt": 0.0999, "stable_at_file_dt": False}, False), (NONE, True),
-    ({"observed_dt": 0.0947, "failing_dt": 0.103}, False), ({"observed_dt": 0.11, "failing_dt": 0.12}, True),  # runs decide
-    ({"limit": "below", "predicted_dt": None, "stable_at_file_dt": False}, False),
-])  # fmt: skip
-def test_a_step_is_stable_up_to_its_limit_unless_runs_show_otherwise(result, more, passed):
-    assert judged(result, [step_row(**more)]) == {(AT_OWN_STEP, "p"): passed}
 
 
 @pytest.mark.parametrize("more, passed", [
@@ -141,38 +127,6 @@ def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
     assert result.top[0] is answers_of(result)[0]
     (cures,) = (finding.values for finding in result.top if finding.kind == "cures")
     assert {cure.change for cure in cures["cures"]} >= {"less_kv", "more_armature"}
-
-
-def test_changes_that_help_are_those_at_the_posture_that_is_told(result):
-    rows = [
-        step_row(posture=name, predicted_dt=dt, stable_at_file_dt=False)
-        for name, dt in (("p", 0.05), ("q", 0.02))
-    ]
-    places = [PlaceAnswer([row], {}, [Cure(row.posture, 2.0)]) for row in rows]
-    step = of_file.AtStep(Asked(0.1, "Euler", []), True, (), ())
-    of_file.add_answer(result, places, step, [SimpleNamespace(outcome="calm")])
-    assert result.top[-1].values["cures"] == [Cure("q", 2.0)]
-
-
-@pytest.mark.parametrize("longest, stable", [(0.16, ["RK4"]), (0.09, [])])
-def test_integrators_whose_limit_is_above_a_requested_step_make_it_stable(result, longest, stable):
-    """The requested step is asked of its own integrator alone; the limits of the others are those of the file's step."""
-    elsewhere = step_row(posture="q", integrator="discrete")
-    result.tables["step_limits"] = [step_row(), step_row(integrator="RK4", predicted_dt=longest), elsewhere]
-    row = step_row(predicted_dt=0.02, stable_at_file_dt=False)
-    step = of_file.AtStep(Asked(0.1, "Euler", []), True, (), ())
-    of_file.add_answer(result, [PlaceAnswer([row], {}, [])], step, [SimpleNamespace(outcome="calm")])
-    assert result.top[-1].values["integrators"] == stable and result.top[-1].values["tried"] == ["RK4"]
-
-
-def test_a_posture_that_is_asked_for_is_the_only_one():
-    for asked in ("spin", "qpos0", "5.7"):
-        rows = found_of(posture=asked).tables["step_limits"]
-        assert {row.posture for row in rows} == {asked}
-    reading = read(TURNING.format(dt=0.002, actuator=MOTOR))
-    postures = [posture_of(text, reading) for text in ("home", "57.29578", "spin")]
-    asked = [standing_at(reading, posture).start[1] for posture in postures]
-    assert asked == pytest.approx([0.1, 1.0, 0.0])
 
 
 @pytest.mark.parametrize("actuator, gains", [(SERVO, {}), (MOTOR, {"kp": 20.0, "kv": 5.0})])

@@ -6,25 +6,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from edited import MOON, XML, setup_of_file
-from models import PATHS, chain, random_tree
-from PIL import Image
+from models import chain, random_tree
 from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
-from compare.experiments import trajectory
-from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import figures_runs, motion, runs
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import diverged_at
-from compare.robots.arm import ARM, landmarks
+from compare.robots.arm import ARM
 from compare.robots.stick import as_seen, stick_figure
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
 CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
-BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
 
 
 def side(case) -> runs.Twin:
@@ -126,9 +122,29 @@ def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the
     coarse, fine = FREE, FREE.changed(dt=5 / 8193)
     assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192]
     assert runs.step_counts(fine, (1, 2)) == [8193]
-    assert runs.steps_afforded(case) == 2_700_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
+    assert runs.steps_afforded(40) == 1_400_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
     counts = [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)]
     assert counts == [5, 65, 65, 64]
+
+
+LIGHT = """<mujoco><worldbody><body><joint name="arm" axis="0 1 0" damping="0.1"/><geom size="0.1" pos="0.3 0 0"/>
+<body pos="0.3 0 0"><joint name="light" axis="0 1 0" damping="1"/>
+<inertial pos="0 0 0" mass="0.001" diaginertia="1e-5 1e-5 1e-5"/></body></body></worldbody></mujoco>"""
+
+
+def test_a_scheme_that_does_not_bear_the_step_of_a_file_is_compared_in_the_beginning(tmp_path):
+    """RK4, of a joint that decays at 1e5 per s; the others have its damping implicit. A user's own scene stays as it is."""
+    setup = setup_of_file(LIGHT)
+    case = setup.robot.case("c", duration=1.0, dt=1 / 64, tags=("own",))
+    result, stated = (runs.follow(each, setup.engines, (1,)) for each in (case, case.changed(tags=("user",))))
+    assert {check.passed for check in result.checks} == {True} and False in {
+        check.judged for check in stated.checks
+    }
+    for row in result.rows:
+        dt = pytest.approx(1e-5 if row.engine_integrator == "RK4" else 1 / 64, rel=0.01)
+        assert (row.dt, row.judged_until / 64) == (dt, dt)
+    assert {run.scheme for run in result.runs} == {"semi_implicit_euler", "implicit"}
+    assert {row.engine_integrator for row in result.of_beginnings} == {"RK4"} and stated.of_beginnings == []
 
 
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
@@ -149,12 +165,6 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
         ours, theirs = (getattr(paths[engine], name)[:, 0] for engine in ("tmt", "mujoco"))
         assert np.array_equal(ax.lines[0].get_ydata(), ours)
         assert np.array_equal(ax.lines[1].get_ydata(), theirs[::3])
-
-
-def test_which_figures_there_are_follows_what_was_run():
-    result = TrajectoryResult("trajectory", runs=[run_of(FREE), run_of(HELD)], errors={HELD.name: (0.1, 0.2)})
-    names = ["assignment_figure_2", "motion", "trajectory_ball_catch_held", "trajectory_bent_free"]
-    assert sorted(call()[0] for call in trajectory.figures(result, ARM)) == names
 
 
 def test_a_ball_is_drawn_by_its_turn_from_the_start():
@@ -182,54 +192,8 @@ def drawn(followed):
     return motion.pictures_of(run)
 
 
-def test_what_is_let_go_is_drawn_by_the_finest_run_and_every_picture_is_a_state_of_it(drawn, followed):
-    run = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 256))
-    np.testing.assert_array_equal(drawn.t, run.t[::2])
-    for name, path in run.paths.items():
-        points = [[np.array([*point], float) for point in landmarks(q)] for q in path.q[::2]]
-        np.testing.assert_allclose(drawn.points[name], as_seen(np.array(points)), atol=1e-15)
-    apart = np.abs(run.paths["tmt"].q - run.paths["mujoco"].q).max(axis=1)
-    np.testing.assert_array_equal(drawn.apart, apart[::2])
-
-
-def test_a_run_is_drawn_until_it_has_diverged(followed):
-    coarse = next(run for run in followed if (run.scheme, run.steps) == ("rk4", 64))
-    for ended, last in ((None, 64), (2.5, 31), (5 / 64, 0)):
-        paths = coarse.paths | {"tmt": coarse.paths["tmt"]._replace(ended=ended)}
-        scene = motion.pictures_of(replace(coarse, paths=paths))
-        seen = np.isfinite(scene.points["tmt"]).all(axis=(1, 2))
-        assert len(scene.t) == 65 and np.flatnonzero(seen).tolist() == [*range(last + 1)]
-        assert np.array_equal(np.isfinite(scene.apart), seen) and np.isfinite(scene.points["mujoco"]).all()
-
-
-def test_a_free_body_is_a_cross_that_turns_with_it():
-    robot, half = setup_of_file(PATHS["free_body"]).robot, np.sqrt(0.5)
-    a_quarter_about_z = np.array([[0.0, 0.0, 2.0, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 2.0, half, 0.0, 0.0, half]])
-    points, links = stick_figure(robot, a_quarter_about_z, crosses=True)
-    before, after = points[:, -3:] - points[:, :1]
-    assert links[-3:] == [(0, 2), (0, 3), (0, 4)] and np.abs(before).max() > 0.1
-    turn = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-    np.testing.assert_allclose(after, before @ turn, atol=1e-15)
-
-
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
     points, links = stick_figure(setup_of_file(chain(3)).robot, np.zeros((1, 3)))
     assert links == [(0, 1), (1, 2), (2, 3)] and points.shape == (1, 4, 3)
     right, _, up = as_seen(np.eye(3))
     assert up == pytest.approx([0.0, np.cos(np.radians(20.0))]) and right[0] > 0.9
-
-
-def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
-    left = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]])
-    right = left[:, ::-1]
-    points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
-    scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
-    gif.Animation([scene], "TMT").savefig(tmp_path / "motion.gif")
-    found = []
-    with Image.open(tmp_path / "motion.gif") as image:
-        for k in range(image.n_frames):
-            image.seek(k)
-            pixels = np.asarray(image.convert("RGB"), int)[gif.TOP : -gif.BOTTOM]  # below the names
-            columns = [np.nonzero(np.abs(pixels - colour).max(axis=2) < 8)[1] for colour in (BLUE, ORANGE)]
-            found.append([of.mean() // (gif.PIXELS[0] / 2) if len(of) > 100 else None for of in columns])
-    assert found == [[0, 1], [0, 0], [0, None]]  # in the left half, in the right one, nowhere

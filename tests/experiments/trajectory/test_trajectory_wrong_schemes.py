@@ -59,17 +59,6 @@ def test_a_wrong_scheme_leaves_the_band(scheme, wrong, scene, integrator, engine
     assert failing(CASES[scene], engines, integrator) >= {(integrator, level) for level in STEPS}
 
 
-def test_a_body_that_tumbles_tells_how_a_quaternion_is_moved(monkeypatch):
-    """RK4 that turns it by the mean of its speeds, as MuJoCo did up to 3.17, or the other way round."""
-    setup = setup_of_file(PATHS["free_body"])
-    engines, speed = setup.engines, (0.0, 0.0, 0.0, 200.0, 300.0, -100.0)
-    scene = Scene("tumbling", speed=speed, duration=0.125, dt=1 / 64, judged=0.0)
-    case, scheme = Case(setup.robot, scene), engines["mujoco"].methods["RK4"].scheme
-    assert failing(case, engines, "RK4") == set()
-    monkeypatch.setitem(METHODS, scheme, METHODS["rk4_mean_speed" if scheme == "rk4" else "rk4"])
-    assert failing(case, engines, "RK4") == {("RK4", level) for level in STEPS}
-
-
 @pytest.fixture(scope="module")
 def gripper():
     """A case of its servos, and the engines; its tendon pulls two fingers, its first servo has a gear."""

@@ -6,7 +6,7 @@ EDITS = (
     ("experiments.engines", "compare_quantity", "FACTOR * eps * size", "100 * FACTOR * eps * size", "tolerance x 100"),
     ("experiments.engines", "compare_quantity", "record.eps", "1.2e-07", "every engine is judged as float32"),
     ("engines.readings", "tolerance_of", "FACTOR * record.eps", "1e9 * record.eps", "numbers as read: 64 -> 1e9"),
-    ("engines.readings", "add_differing", "cause_of(_1)", "None", "no cause is named"),
+    ("engines.readings", "add_differing", "cause and str(cause)", "None", "no cause is named"),
     ("engines.answer", "as_set", "all(_1)", "True", "other equations are said to be the same"),
     ("engines.answer", "cheapest_of", "row.worst_error <= target", "True", "a method that is not exact enough is the cheapest"),
     ("engines.answer", "cheapest_engine", "min(reached, *_1)", "max(reached, *_1)", "the dearest engine is the cheapest"),

@@ -38,7 +38,7 @@ EDITS = (
     ("export.checks", "Judge.largest", "self.factor * np.asarray(scale)", "2.0 * _0", "tolerance x 2"),
     ("export.checks", "Judge.__init__", "FACTOR * eps", "FACTOR * 1.2e-07", "doubles have the tolerance of floats"),
     ("export.checks", "Judge.rows", "zip(labels, values, *_1)", "zip(labels[:1], values)", "one part of several is judged"),
-    ("export.checks", "worst_of", "_1 if _2 else np.inf", "_1 if _2 else 0.0", "what is no number agrees"),
+    ("export.checks", "worst_of", "share_of(_1, _2)[at]", "0.5", "what is no number agrees"),
     # scales
     ("judge.scale", "levers", "links[..., i]", "100.0 * links[..., i]", "levers x 100", 2),
     ("judge.scale", "levers", "links[..., i]", "0.0 * links[..., i]", "levers without the links", 2),

@@ -4,7 +4,6 @@ EDITS = (
     ("mujoco.step", "options_of", "TOLERANCE", "1e-4", "the force of constraints is that of a coarse solver"),
     ("mujoco.step", "Step.run_program", "(step - delay) // period", "step // period", "a delay delays nothing"),
     ("mujoco.step", "Step.relaxed", "1.0 - rate * self.dt", "1.0", "a relaxed run is not damped"),
-    ("mujoco.forces", "rows", "m.opt.cone == _1 and size > 1", "False", "pyramids have as many rows as ellipses"),
     ("mujoco.forces", "forces_near", "(_1.J - _2.J).T @ acting.f", "(_2.J - _1.J).T @ acting.f", "a constraint turns backwards"),
     ("mujoco.forces", "forces_near", "if ahead is None or behind is None:\n    return None", "pass", "an edge is no edge"),
     ("mujoco.variants", "in_the_air", "has_free_base(model)", "False", "in the air a free base falls"),

@@ -16,7 +16,7 @@ EDITS = (
     ("simulation", "singular_in", "alive - 1", "0", "the last state is not looked at", 1),
     ("articulated", "outward", "2.0 * qd[_1]", "qd[_1]", "half of a slide's Coriolis acceleration"),
     ("articulated", "about_point", "J.times(omegad) + _1", "_1", "no angular acceleration in Euler's equation"),
-    ("articulated", "mass_matrix_and_bias", "M[k][k] + tree.armature[k]", "M[k][k]", "large trees have no armature"),
+    ("articulated", "mass_matrix_and_bias", "with_diagonal(M, tree.armature)", "M", "large trees have no armature"),
     ("entries", "Entries.wrong", "float('inf')", "2.0 * float('nan')", "compiled code finds every state wrong"),
     ("entries", "Entries.wrong", "_1.compare('lt', _2)", "_1.compare('ge', 0.0)", "what is infinite is answered"),
     ("entries", "Entries.wrong", "_1.compare('ge', SHORTEST)", "_1.compare('ge', 0.0)", "a quaternion may be short"),
