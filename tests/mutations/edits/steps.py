@@ -23,7 +23,6 @@ EDITS = (
     ("stability.limits", "grows_by_itself", "low * _1 < _2 < _3", "False", "no saddle is told"),
     ("stability.limits", "REFINED", "2e-3", "0.5", "a limit is known to a half"),
     ("stability.place", "beyond_saddles", "is_saddle(*_1)", "False", "no saddle is left"),
-    ("stability.growth", "has_grown", "len(sizes) < steps or _1", "False", "a run that is broken off has not grown"),
     ("stability.runs", "Runs.run", "_1 and self.is_at_rest(*_2)", "_1", "what falls over and lies still has survived"),
     ("stability.runs", "Runs.is_at_rest", "_1 and is_near(there.state)", "False", "a rest is the same at every step"),
     ("stability.runs", "Runs.calms", "_1 or shown.decays", "_1", "what calms down slowly never does"),
