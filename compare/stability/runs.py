@@ -158,8 +158,8 @@ class Runs:
         return self.survives(push, dt, way) or self.fine_speed(push) == np.inf
 
     def hold(self, dt: float) -> bool:
-        """Whether the robot stays at rest after one small push."""
-        return self.holds(LIMIT_PUSHES[0], dt)
+        """Whether the robot stays at rest after small pushes of one way."""
+        return all(self.holds(push, dt) for push in LIMIT_PUSHES)
 
     def all_hold(self, dt: float) -> bool:
         """Whether the robot stays at rest whichever way it is pushed, and how little."""
