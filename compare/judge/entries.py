@@ -2,25 +2,28 @@
 
 Entries differ in unit (kg and kg m2, N and N m) and size: one number for all would hide errors of small ones.
 The scale of an entry is the sum of the absolute values of the terms that are added in it, each at its
-maximum. With L_i the largest possible distance of the centre of mass of a body from the axis or anchor of
-joint i at that state:
+maximum; its tolerance is 64 eps x scale. For a body with mass m and inertia I at a state:
 
-    a column of T_b     t_i = L_i + W / 8 + R / 64 of a hinge or ball, 1 of a slide, 0 if i moves it not
-    of B_b              u_i = 1 of a hinge or ball, 0 of a slide
-    speeds              S: sum of |rates| that turn the body, V: that slide it, w = V + sum of t_i |rates|
-    Mbar_ij             sum of m t_i t_j + |I| u_i u_j, and the armature
-    h_i                 sum of t_i m (2 S w + g) + u_i (m V^2 + |I| S^2)
+    (1)  L_i    largest possible distance of its centre of mass from the axis or anchor of joint i
+    (2)  t_i    column of T_b: L_i + W / 8 + R / 64 of a hinge or ball, 1 of a slide, 0 if i does not move it
+    (3)  u_i    column of B_b: 1 of a hinge or ball, 0 of a slide or if i does not move it
+    (4)  S, V   sums of the |rates| that turn it and that slide it; w = V + sum of t_i |rates|
+    (5)  Mbar_ij = sum of k (m t_i t_j + |I| u_i u_j), and the armature
+    (6)  h_i = sum of k (t_i m (2 S w + g) + u_i (m V^2 + |I| S^2))
 
-W is the largest of all L_i: MuJoCo adds moments about the centre of mass of the whole tree, where terms of up
-to m W^2 leave m L_i^2, and each is rounded by eps: 64 eps (W / 8)^2. R is the largest distance of the body
-from the world's origin: its position, and so each of its levers, is rounded by eps R. Every term of a body is
-multiplied by k, the number of hinges and balls that turn it, at least 1: each turn passes on the rounding of
-those before it and adds its own. Bodies that MuJoCo fuses one after another are turned into the principal
-axes of each sum and back, all that are in it: k is then multiplied by the number of them. A movement of joint
-j changes at most four factors of a term, a lever and those of an acceleration: of a turn each by its own
-size, so that the scale of d(Mbar qdd + h)/dq_j is four times that of the terms of the bodies that j moves; of
-a slide levers by 1, accelerations by S^2. Where a system is solved, errors of eps in Mbar and in the forces
-are multiplied by |Mbar^-1|, entry by entry: a condition number would depend on the units.
+W is the largest L_i of all bodies: MuJoCo adds moments about the centre of mass of the whole tree. Terms of
+up to m W^2 cancel down to m L_i^2; each is rounded by eps m W^2, which is 64 eps m (W / 8)^2.
+R is the largest distance of the body from the world's origin. Its position, and so each of its levers, is
+rounded by eps R, which is 64 eps (R / 64).
+k is the number of hinges and balls that turn the body, at least 1: each turn passes on the rounding of those
+before it and adds its own. Where MuJoCo fuses bodies, one after another, each sum is turned into its principal
+axes and back: k is then multiplied by the number of bodies that are fused.
+
+A derivative by the movement of joint j changes at most four factors of a term, a lever and those of an
+acceleration. A turn changes each by its own size: the scale of d(Mbar qdd + h)/dq_j is four times that of the
+terms of the bodies that j moves. A slide changes levers by 1 and accelerations by S^2.
+Where a system is solved, errors of eps in Mbar and in the forces are multiplied by |Mbar^-1|, entry by entry:
+a condition number would depend on the units.
 """
 
 from functools import cached_property
@@ -50,7 +53,7 @@ class Entries:
     def __init__(self, tree: tmt.Tree, q: np.ndarray, qd: ArrayLike = 0.0, fused: ArrayLike = 1):
         self.tree, self.q = tree, q
         self.qd = np.broadcast_to(qd, (len(q), tree.coordinates.nv))
-        from_joints, self.reach = levers(tree, q)
+        from_joints, self.reach = levers(tree, q)  # (1) L_i and R
         if (from_joints == from_joints[:1]).all():  # no slide moves a body farther from a hinge
             from_joints = from_joints[:1]
         joints_of_bodies = np.array([tree.moves(b) for b in range(len(tree.mass))])
@@ -58,14 +61,14 @@ class Entries:
         self.count = np.maximum(1, (joints_of_bodies & is_turn).sum(axis=1)) * fused  # k, (m,)
         self.of_speed = [i for i, joint in enumerate(tree.coordinates.joints) for _ in tree.axis[joint.qd]]
         moved, turns = joints_of_bodies[:, self.of_speed], is_turn[self.of_speed]
-        self.slides, self.turns = moved & ~turns, moved & turns  # (m, nv)
+        self.slides, self.turns = moved & ~turns, moved & turns  # (3) u_i is that of turns, (m, nv)
         arms = from_joints[..., self.of_speed] + from_joints.max(initial=0.0) / 8
         arms = arms + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
-        self.t = self.slides + self.turns * arms  # (1 or states, m, nv)
+        self.t = self.slides + self.turns * arms  # (2), (1 or states, m, nv)
         self.mass = self.count * np.array(tree.mass)
         self.inertia = self.count * np.linalg.norm(tree.inertia, 2, axis=(1, 2))
         rates = np.abs(self.qd)
-        self.spin, self.slip = rates @ self.turns.T, rates @ self.slides.T  # S and V, (states, m)
+        self.spin, self.slip = rates @ self.turns.T, rates @ self.slides.T  # (4) S and V, (states, m)
         self.speed = np.einsum("sbi,si->sb", self.t, rates)  # w
         self.positions, self.B = (self.count * self.reach)[:, :, None], self.count[None, :, None, None]
         self.angular_velocities, self.w_conv = ((self.count * self.spin**k)[:, :, None] for k in (1, 2))
@@ -83,7 +86,7 @@ class Entries:
 
     @cached_property
     def added(self) -> np.ndarray:
-        """The terms of Mbar, (states, nv, nv)."""
+        """The terms of Mbar, (5), (states, nv, nv)."""
         translation = np.einsum("b,sbi,sbj->sij", self.mass, self.t, self.t, optimize=True)
         rotation = np.einsum("b,bi,bj->ij", self.inertia, self.turns, self.turns)
         return self.of_states(translation + rotation + np.diag(self.tree.armature))
@@ -104,6 +107,7 @@ class Entries:
 
     @cached_property
     def bias(self) -> np.ndarray:
+        """(6), (states, nv)."""
         newton = self.mass * 2.0 * self.spin * self.speed
         euler = self.mass * self.slip**2 + self.inertia * self.spin**2
         return np.einsum("sb,sbi->si", newton, self.t) + euler @ self.turns + self.weight

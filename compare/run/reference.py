@@ -31,7 +31,6 @@ from ..stability.place import posture_of
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
 SOLUTION = "solution"  # the kind of reference that is another file
-Text = str | None  # None: not given
 
 
 class JointsDiffer(ModelError):
@@ -116,43 +115,53 @@ class Compared(NamedTuple):
 
 
 def compared_with(
-    reference: Text, path: Text, joints: Text = None, shown: Text = None, solution: Text = None,
-    floating: bool = False,
+    asked: str | None, path: str | None, joints: str | None = None, shown: str | None = None,
+    solution: str | None = None, floating: bool = False,
 ) -> Compared:  # fmt: skip
-    """A file (None: the arm's) and a reference (None: the arm for a file with its hinges, else model).
+    """A file (None: the arm's) and the reference that --reference asks for.
 
-    joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
-    solution: the path of the solution, if not `reference`; floating: the base of a URDF has a free joint.
+    asked: "arm", "model", another robot's file or own equations; None: the arm for a file with its hinges, else
+    model. joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
+    solution: the path of the other robot's file, if not `asked`; floating: the base of a URDF has a free joint.
     ModelError, in one line, for a file that cannot be compared, JointsDiffer for different joints,
     OwnError for equations that cannot be used.
     """
     source, shown = Source(Path(path or ARM.mjcf), floating), in_one_line(shown or path or "mjcf/arm.xml")
-    if reference == "arm" or (reference is None and (path is None or has_hinges(source, ARM.joints))):
+    if asked == "arm" or (asked is None and (path is None or has_hinges(source, ARM.joints))):
         return with_arm(source, path, shown)
+    if asked and is_solution(asked):
+        return with_solution(source, shown, asked, solution or asked)
     reading = read(source)
-    said = tuple(map(say, remarks(reading, has_scenes=True)))
-    of_file = Reference("model", shown, said, reading.warnings, source=in_one_line(reference or ""))
-    if reference and is_solution(reference):
-        other = Source(Path(solution or reference))
-        stated = read(other)
-        names, renamed = joints_matched(stated, reading, shown, of_file.source)
-        if bodies_on(stated, names) != bodies_on(reading, reading.tree.joint_names):
-            source, other = source.joined(), other.joined()
-            reading, stated = read(source), read(other)
-        placement = placed(replace(stated.tree, joint_names=names), reading.tree)
-        unlike = not_compared(reading, stated, names)
-        # its actuators do not act: those of the file may differ
-        stated = replace(stated, tree=placement.tree, drive=Drive())
-        robot = robot_of_solution(reading, shown, stated, of_file.source)
-        otherwise = tuple(map(say, placement.remarks() + of_welded(source) + unlike))
-        of_file = of_file._replace(kind=SOLUTION, renamed=renamed, otherwise=otherwise)
-        return Compared(of_file, robot, engine(reading, stated), reading)
     robot, mujoco = robot_of(reading, shown), engine(reading)
-    if reference in (None, "model"):
-        return Compared(of_file._replace(source=""), robot, mujoco, reading)
-    own = own_engine(reference, robot, mujoco, joints)
+    if asked in (None, "model"):
+        return Compared(reference_of("model", reading, shown), robot, mujoco, reading)
+    own = own_engine(asked, robot, mujoco, joints)
     robot = replace(robot, own=tuple(own.equations.functions))
-    return Compared(of_file._replace(kind="own", own=own), robot, mujoco, reading)
+    reference = reference_of("own", reading, shown)._replace(source=in_one_line(asked), own=own)
+    return Compared(reference, robot, mujoco, reading)
+
+
+def reference_of(kind: str, reading: Reading, shown: str) -> Reference:
+    """The reference of a file as compiled, with what is fixed, changed or switched off in it."""
+    return Reference(kind, shown, tuple(map(say, remarks(reading, has_scenes=True))), reading.warnings)
+
+
+def with_solution(source: Source, shown: str, asked: str, solution: str) -> Compared:
+    """A file and that of another robot with the same joints, placed as in the file; solution: its path."""
+    reading, other, name = read(source), Source(Path(solution)), in_one_line(asked)
+    stated = read(other)
+    reference = reference_of(SOLUTION, reading, shown)
+    names, renamed = joints_matched(stated, reading, shown, name)
+    if bodies_on(stated, names) != bodies_on(reading, reading.tree.joint_names):
+        source, other = source.joined(), other.joined()
+        reading, stated = read(source), read(other)
+    placement = placed(replace(stated.tree, joint_names=names), reading.tree)
+    otherwise = placement.remarks() + of_welded(source) + not_compared(reading, stated, names)
+    # its actuators do not act: those of the file may differ
+    stated = replace(stated, tree=placement.tree, drive=Drive())
+    robot = robot_of_solution(reading, shown, stated, name)
+    reference = reference._replace(source=name, renamed=renamed, otherwise=tuple(map(say, otherwise)))
+    return Compared(reference, robot, engine(reading, stated), reading)
 
 
 def not_writable(path: Path, robot: str) -> str:
@@ -164,7 +173,7 @@ def not_writable(path: Path, robot: str) -> str:
     return "it is the file of the robot itself" if path.resolve() == Path(robot).resolve() else ""
 
 
-def with_arm(source: Source, path: Text, shown: str) -> Compared:
+def with_arm(source: Source, path: str | None, shown: str) -> Compared:
     """A file (None: the arm's) and the arm's numbers, placed as in the file, whose welded bodies are one."""
     if path is None:
         return Compared(Reference("arm", shown, (), source.warnings), ARM, parse(source, ARM.tree), None)
@@ -184,8 +193,8 @@ def with_arm(source: Source, path: Text, shown: str) -> Compared:
     return Compared(of_arm, robot, parse(source, robot.tree), None)
 
 
-def is_solution(reference: str | None) -> bool:
-    return (reference or "").lower().endswith((".xml", ".mjcf"))
+def is_solution(reference: str) -> bool:
+    return reference.lower().endswith((".xml", ".mjcf"))
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:

@@ -10,7 +10,7 @@ from trees import random_states
 
 import tmt
 from compare.engines.mujoco import calls, engine, parse, read
-from compare.engines.mujoco.differences import left_to_itself, transition
+from compare.engines.mujoco.calls import left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
