@@ -37,6 +37,7 @@ class StepLimitRow(Row):
     observed_dt, failing_dt: the longest step at which runs hold and the shortest at which they fail; failing_dt alone is None
     where they hold up to the longest that is tried.
     start_dt: the longest step up to which a run from the posture itself comes to rest where it rests, where that is lower.
+    limiting_joint, limiting_contact: of the mode that grows beyond predicted_dt; where runs decide, of no limit but that.
     smooth_dt: the limit without dry friction, where that is lower. growth: per step, at the file's step; apart: in closed form
     minus that. growth_rate: just beyond the limit; of a saddle that of its fall. finer_push: whether a finer step bears no
     larger push, asked below the usual push. moved: from the posture to the rest. has_fallen: by a free body.

@@ -24,7 +24,7 @@ class Change(NamedTuple):
 
 
 class Cure(NamedTuple):
-    """A change that makes a step stable. value: the number that is to be stated; element: where."""
+    """A change that makes a step stable. change: the name of a Change; factor: its least strength."""
 
     change: str
     factor: float

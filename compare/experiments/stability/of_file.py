@@ -153,9 +153,8 @@ def add_checks(result: StabilityResult, rows: Sequence[StepLimitRow], quantity: 
             result.check(where, MODES, abs(row.apart) / row.growth, RADII_WITHIN, "")
     own = in_use(rows, rows[0].file_integrator)
     for row in own:
-        note = ", ".join(
-            filter(None, (f"with {row.file_integrator}", row.limiting_joint, row.limiting_contact))
-        )
+        mode = ("in runs",) if row.decided_by_runs else (row.limiting_joint, row.limiting_contact)
+        note = ", ".join(filter(None, (f"with {row.file_integrator}", *mode)))
         limit = max(min(row.longest, LONGEST), SHORTEST)
         result.check(row.posture, quantity, row.file_dt, limit, "s", note, about=about)
         if row.stable_at_file_dt and row.largest_push is not None and not row.has_fallen:
