@@ -168,7 +168,7 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     joint, contact = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
         posture=place.posture.name, base="free" if has_free_base(place.reading.model) else "fixed",
-        surroundings=place.surroundings, integrator=integrator, limit=found.kind.replace(" ", "_"),
+        surroundings=place.surroundings, integrator=integrator, limit=found.kind,
         predicted_dt=found.dt, file_dt=dt, file_integrator=asked.integrator,
         limiting_joint=joint, limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,
         has_fallen=place.has_fallen, moved=float(moved.max()), moved_joint=place.speed_names[int(np.argmax(moved))],
@@ -178,7 +178,7 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
         row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
     if at.rest.left <= SETTLED and not place.held_objects:
         row.apart = radius_apart(at.rest, place.tree)
-    moves = found.kind == "no rest" or (place.is_touching and place.creep > MOVING)
+    moves = found.kind == "no_rest" or (place.is_touching and place.creep > MOVING)
     if moves and found.kind != "saddle" and not place.falls:
         row.limit, row.predicted_dt = "moving", None
     is_asked = place.contacts or integrator == asked.integrator  # in the air the others have no use

@@ -42,7 +42,7 @@ class Limit:
     """The largest stable step of an integrator.
 
     kind: finite; none, stable up to LONGEST; below, not stable at SHORTEST; saddle, something grows at any step, at the rate
-    of `growth`; no rest, none was found.
+    of `growth`; no_rest, none was found.
     dt: s, of a finite one. growth: of what grows just beyond. rest: the one just below the limit, else at the last step tried.
     tries: all steps of the search, in its order.
     """
@@ -94,7 +94,7 @@ def limit(
         elif grows_by_itself(at, finer):
             return limit(model, state, integrator, first, finer.growth.rate)
         elif not (at.rest.is_found or finer.rest.is_found):
-            return Limit("no rest", None, finer.growth, finer.rest, tries)
+            return Limit("no_rest", None, finer.growth, finer.rest, tries)
         else:
             failing = finer
         at = finer

@@ -59,7 +59,7 @@ def test_a_saddle_that_leads_nowhere_is_told_with_its_rate(actuator, rate):
 def test_what_falls_has_no_rest_and_one_in_the_air_has():
     falling, lying = place_of(STONE.format("")), place_of(STONE.format(FLOOR))
     assert falling.left == pytest.approx(9.81) and falling.surroundings == "free" and not falling.is_touching
-    assert limit_of(STONE.format("")).kind == "no rest"
+    assert limit_of(STONE.format("")).kind == "no_rest"
     assert in_the_air_at(falling).left < NEAR_REST
     assert lying.has_fallen and lying.is_touching and lying.moved[2] == pytest.approx(-0.9, abs=1e-3)
     assert limit_of(STONE.format(FLOOR)).kind == "none"
