@@ -293,7 +293,3 @@ def test_accelerations_alone_have_a_mass_matrix_and_a_bias():
     in_degrees = lambda q, v, t: acceleration(q, v, t - [4.0, 0.0] * (q - 30.0))  # noqa: E731
     of_degrees = message_of(sprung, acceleration=in_degrees)
     assert "springref of hip: 30 rad instead of 0.5235987756 (degrees?)" in of_degrees
-
-
-def test_single_precision_is_said():
-    assert "single precision" in message_of(bias=lambda q, v: bias(q, v).astype(np.float32).astype(float))

@@ -11,8 +11,9 @@ from edited import XML, edited, setup_of, untimed_speed
 
 from compare.core.check import Result
 from compare.experiments import module, parameters, reduction, stability, trajectory
+from compare.report.verdict import Section
 from compare.robots.arm import ARM
-from compare.run.examine import Setup, in_one
+from compare.run.examine import Setup, in_one, new_causes
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
@@ -123,6 +124,9 @@ def test_a_wrong_model_fails_wherever_it_matters(name, experiments):
 OF_A_SOLUTION = "rest"  # compared with a solution alone
 
 
+BODY = '<body name="forearm" pos="0 0 -0.3"'
+
+
 def found(text):
     result = parameters.rows(setup_of(text, make=Setup, states=20))
     failed = {check.quantity for check in result.checks if not check.passed}
@@ -222,3 +226,14 @@ def test_what_is_wrong_for_another_reason_stays_another_cause():
     assert len(places(edited((FOREARM, FINGERTIP)))) == 2
     no_body = LOADED.replace("0.0011 0.0266", "0.0009 0.0266")  # has this inertia
     assert len(places(edited((FOREARM, no_body)))) == 3
+
+
+@pytest.mark.parametrize("edits, causes", [
+    # 90 degrees where radians are meant
+    ([(BODY, f'{BODY} euler="0 90 0"'), (GAMMA, f'{GAMMA} damping="0.1"')], ["zero of gamma", "damping of gamma"]),
+    ([(BETA, f'{BETA} pos="0.01 0 0"')], ["anchor x of beta", "com x of upper arm"]),
+])  # fmt: skip
+def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, causes):
+    setup = setup_of(edited(*edits), make=Setup, states=20)
+    sections = [Section("parameters", "", "", "", parameters.rows(setup))]
+    assert [cause.place for cause in new_causes(setup, sections, [])] == causes

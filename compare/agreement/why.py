@@ -17,13 +17,15 @@ from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
 from ..diagnosis.model import ROUNDED
 from ..engines.own import QUICK, OwnEquations
+from ..judge.entries import Entries
 from ..robots.coordinates import Coordinates
-from .accelerations import CONSTANT, Affine
 from .comparison import Comparison
 from .tables import slips_of_tables
 
 SECONDS_OF_CAUSE = 4.5  # of a search
 SECONDS_OF_SLOPES = 1.5  # of accelerations at several torques
+LARGER = 8.0  # times the scale: a slope is a difference of two accelerations
+CONSTANT = 1e-8  # of a factor at all states
 
 
 class Why(NamedTuple):
@@ -42,6 +44,53 @@ class Asked(NamedTuple):
     equations: OwnEquations | None  # None: values alone
     stated: Stated
     rounding: float = ROUNDED
+
+
+class Affine(NamedTuple):
+    """A user's function qdd = A tau + a, in the model's joints."""
+
+    tree: Tree
+    equations: OwnEquations
+
+    def slopes(self, q: ndarray) -> ndarray:
+        """A, (states, nv, nv): of accelerations at rest."""
+        zero, size = np.zeros((len(q), self.equations.coordinates.nv)), 1.0 + Entries(self.tree, q).force()
+        still = self.equations.acceleration(q, zero, zero)
+        pushed = [self.equations.acceleration(q, zero, size * unit) for unit in np.eye(zero.shape[1])]
+        return np.stack(pushed, axis=2) / size[:, None, :] - still[:, :, None] / size[:, None, :]
+
+    def mass_matrix(self, q: ndarray) -> ndarray:
+        return np.linalg.inv(self.slopes(q))
+
+    def bias(self, q: ndarray, M: ndarray, qd: ndarray) -> ndarray:
+        """h of Mbar qdd = tau - D qd - k (q - rest) - h, with the damping and springs of the model."""
+        qdd = self.equations.acceleration(q, qd, 0.0 * qd)
+        passive = np.array(self.tree.damping) * qd + literal.spring_torque(q, self.tree)
+        return -np.einsum("sij,sj->si", M, qdd) - passive
+
+    def inputs(self, q: ndarray) -> ndarray | None:
+        """By which factor each torque acts, (nv,), if the mass matrix is right; None if it is not."""
+        right = literal.mass_matrix(q, self.tree)
+        acting = right @ self.slopes(q)
+        factors = np.einsum("sii->si", acting)
+        off = np.abs(acting - factors.mean(axis=0)[:, None] * np.eye(len(factors[0])))
+        return factors.mean(axis=0) if off.max() <= CONSTANT * (1.0 + np.abs(acting).max()) else None
+
+    def values(self, q: ndarray, qd: ndarray, rounding: float) -> "tuple[Values, partial[ndarray]] | None":
+        """The mass matrix and the bias, and the bias at other speeds; None where there is no such matrix."""
+        slopes = self.slopes(q)
+        if not np.isfinite(slopes).all() or (np.linalg.cond(slopes) > 1e8).any():
+            return None
+        M, scale = np.linalg.inv(slopes), Entries(self.tree, q, qd)
+        size = 1.0 + scale.force()
+        qdd = self.equations.acceleration(q, qd, 0.0 * qd)
+        still = scale.acceleration(scale.force(), qdd)
+        of_slopes = still[:, :, None] / size[:, None, :] + np.abs(slopes)
+        allowed = LARGER * rounding * np.abs(M) @ of_slopes @ np.abs(M)
+        forces = np.einsum("sij,sj->si", np.abs(M), still) + scale.force()
+        of_h = np.einsum("sij,sj->si", allowed, np.abs(qdd)) + LARGER * rounding * forces
+        values = Values(q, qd, M, self.bias(q, M, qd), (allowed, of_h))
+        return values, partial(self.bias, q, M)
 
 
 def cause_of(comparison: Comparison) -> Why:

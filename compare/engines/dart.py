@@ -65,7 +65,7 @@ class Model(OfUrdf):
 
     def start(self, at: State, dt: float, method: str | None) -> None:
         self.world.setTimeStep(dt)
-        self.rotors = self.read["armature"] / dt  # coefficients of the dampers that are armature
+        self.rotors = self.used["armature"] / dt  # coefficients of the dampers that are armature
         damping = self.rotors + (0.0 if method is None else self.stated["damping"])
         for place, joint in self.dampers.items():
             joint.setDampingCoefficient(0, damping[self.order.v[place]])

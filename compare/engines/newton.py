@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from tmt import Tree
 
 from . import Array, EngineRecord
-from .outside.bodies import Body, Link, Numbers
+from .outside.bodies import Body, Link
 from .outside.file import EngineError, File, OtherJoints
 from .outside.model import SteppedModel
 from .outside.order import XYZW, Order, State
@@ -58,7 +58,6 @@ class Model(SteppedModel):
         else:
             builder.add_mjcf(str(file.path), skip_equality_constraints=True)
         self.newton, self.file, self.model = newton, file, builder.finalize(device="cpu")
-        self.read: dict[str, Array] = {}
         self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.solver = cache(self.made_solver)
         for name in OFF:
@@ -66,9 +65,10 @@ class Model(SteppedModel):
         self.firsts, self.children = self.model.joint_qd_start.numpy(), self.model.joint_child.numpy()
         self.order = self.made_order()
         self.joint_at = {start: k for k, (_, start) in self.order.starts.items()}
+        self.used = {"gravity": np.ravel(self.model.gravity.numpy())}
         for name in ("armature", *PASSIVE):
             values = getattr(self.model, f"joint_{name}").numpy().astype(float)
-            self.read[name] = self.order.tree_numbers(values)
+            self.used[name] = self.order.tree_numbers(values)
 
     def made_order(self) -> Order:
         from .mujoco.names import joint_places, kind_of
@@ -105,18 +105,15 @@ class Model(SteppedModel):
             prm.zero_()  # with actuation disabled implicitfast would be explicit in the damping
         return solver
 
-    def fields(self) -> Numbers:
-        return {"gravity": np.ravel(self.model.gravity.numpy()), **self.read}
-
-    def set_field(self, name: str, values: Array) -> bool:
+    def apply(self, name: str) -> None:
         if name == "gravity":
-            self.model.gravity.assign(np.reshape(values, (1, 3)))
+            self.model.gravity.assign(np.reshape(self.used[name], (1, 3)))
         else:
-            self.read[name] = np.array(values)
-            getattr(self.model, f"joint_{name}").assign(values[self.order.v])
-        if name == "armature" and values[self.order.is_of_free()].any():
-            return False  # it acts on the velocity of the centre of mass
-        return bool(self.near(self.fields()[name], values).all())
+            getattr(self.model, f"joint_{name}").assign(self.used[name][self.order.v])
+
+    def unable(self, name: str) -> Array:
+        """The armature of a free body acts on the velocity of its centre of mass."""
+        return self.order.is_of_free() & (name == "armature")
 
     def links(self, at: State) -> list[Link]:
         self.set_state(at)
@@ -169,11 +166,11 @@ class Model(SteppedModel):
     def set_passive(self, method: str | None) -> None:
         """Give a method the damping and stiffness that act in it; None: none."""
         for name in PASSIVE:
-            values = self.read[name][self.order.v] * (method is not None)
+            values = self.used[name][self.order.v] * (method is not None)
             getattr(self.model, f"joint_{name}").assign(values)
         is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
-        is_damped = self.read["damping"][self.order.is_of_free()].any()
-        if method == FEATHERSTONE and (is_damped or self.read["stiffness"][is_of_ball].any()):
+        is_damped = self.used["damping"][self.order.is_of_free()].any()
+        if method == FEATHERSTONE and (is_damped or self.used["stiffness"][is_of_ball].any()):
             missing = "no springs of ball joints and no damping of free joints"
             raise EngineError(f"the Featherstone solver has {missing}")
         self.solver(method or FEATHERSTONE)

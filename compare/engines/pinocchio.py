@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from . import Array, EngineRecord
-from .outside.bodies import Body, Link, Numbers
+from .outside.bodies import Body, Link
 from .outside.file import File, OtherJoints, OtherNames
 from .outside.mjcf_text import original_or_copy
 from .outside.model import ReadModel
@@ -31,6 +31,9 @@ class Model(ReadModel):
         self.pinocchio, self.file = pinocchio, file
         *_, self.copied = original_or_copy(file.path, self.read)
         self.data = self.model.createData()
+        self.used = {"gravity": self.model.gravity.linear}
+        for name in ("armature", "damping"):
+            self.used[name] = self.order.tree_numbers(getattr(self.model, name))
 
     def read(self, path: Path) -> None:
         """The model of a URDF or MJCF file; OtherJoints where its joints are not those of the compared model."""
@@ -65,12 +68,6 @@ class Model(ReadModel):
         composite = any(joint.shortname() == "JointModelComposite" for joint in self.model.joints)
         return super().quantities + ("derivatives",) * (not self.file.free and not composite)
 
-    def fields(self) -> Numbers:
-        armature, damping = (
-            self.order.tree_numbers(getattr(self.model, name)) for name in ("armature", "damping")
-        )
-        return {"gravity": self.model.gravity.linear, "armature": armature, "damping": damping}
-
     def links(self, at: State) -> list[Link]:
         """Those that Pinocchio's joints move."""
         self.pinocchio.forwardKinematics(self.model, self.data, at.x)
@@ -85,12 +82,11 @@ class Model(ReadModel):
         self.model.inertias[link.name] = self.pinocchio.Inertia(*body)
         return True
 
-    def set_field(self, name: str, values: Array) -> bool:
+    def apply(self, name: str) -> None:
         if name == "gravity":
-            self.model.gravity.linear = values
+            self.model.gravity.linear = self.used[name]
         else:
-            setattr(self.model, name, values[self.order.v])
-        return True
+            setattr(self.model, name, self.used[name][self.order.v])
 
     def mass_matrix(self, at: State) -> Array:
         return symmetric(self.pinocchio.crba(self.model, self.data, at.x))

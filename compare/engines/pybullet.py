@@ -8,7 +8,6 @@ pitch and yaw of the given quaternion as angles about the base's own axes.
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from xml.etree import ElementTree
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -16,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from tmt import Tree
 
 from . import Array, EngineRecord
-from .outside.file import Unwritten
-from .outside.of_urdf import OfUrdf
+from .outside.of_urdf import OfUrdf, without_world
 from .outside.order import XYZW, Order, State, of_free
 
 ENGINE = EngineRecord(
@@ -61,9 +59,9 @@ class Model(OfUrdf):
         for link in (BASE, *numbers):
             self.bullet.changeDynamics(self.robot, link, linearDamping=0.0, angularDamping=0.0)
             self.bullet.changeDynamics(self.robot, link, maxJointVelocity=1e9)
-        self.apply(pybullet.VELOCITY_CONTROL, np.zeros(len(self.moved)))
+        self.control(pybullet.VELOCITY_CONTROL, np.zeros(len(self.moved)))
 
-    def apply(self, mode: int, forces: Array) -> None:
+    def control(self, mode: int, forces: Array) -> None:
         """Set the torques of the joints, or the largest ones of the motors that they have by default."""
         self.bullet.setJointMotorControlArray(self.robot, self.moved, mode, forces=forces.tolist())
 
@@ -76,7 +74,7 @@ class Model(OfUrdf):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        return super().quantities[: 2 if self.read["armature"].any() else 3]
+        return super().quantities[: 2 if self.used["armature"].any() else 3]
 
     def base(self, x: Array) -> tuple[Array, Rotation]:
         """The position of the centre of mass and the principal axes of a free base."""
@@ -120,7 +118,7 @@ class Model(OfUrdf):
 
     def set_force(self, force: Array) -> None:
         free = 6 * self.free
-        self.apply(self.bullet.TORQUE_CONTROL, force[free:])
+        self.control(self.bullet.TORQUE_CONTROL, force[free:])
         if free:
             place, _ = self.bullet.getBasePositionAndOrientation(self.robot)
             in_world = self.bullet.WORLD_FRAME
@@ -139,21 +137,3 @@ class Model(OfUrdf):
             linear, angular = self.bullet.getBaseVelocity(self.robot)
             q, v = np.r_[place - turn.apply(self.centre), turn.as_quat(), q], np.r_[angular, linear, v]
         return q, v
-
-
-def without_world(text: str) -> str:
-    """A URDF whose root is the link of its floating joint; Unwritten if other joints stand on the world."""
-    robot = ElementTree.fromstring(text)
-    carried: set[str] = set()
-    for joint in robot.findall("joint"):
-        parent, child = (next(joint.iter(tag)).attrib["link"] for tag in ("parent", "child"))
-        if parent in carried or (joint.get("type") == "floating" and not carried):
-            carried.add(child)
-        elif joint.get("type") != "fixed":
-            raise Unwritten("joints stand on the world beside a free base")
-        if parent not in carried:
-            robot.remove(joint)
-    for link in robot.findall("link"):
-        if link.attrib["name"] not in carried:
-            robot.remove(link)
-    return ElementTree.tostring(robot, encoding="unicode")

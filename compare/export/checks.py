@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -9,9 +10,12 @@ import numpy as np
 
 from tmt.derivation.quantities import quantity_of
 from tmt.exact.many import Pairs, exact_of_many
+from tmt.export.parameters import PAYLOAD, PLACES, Parameters
 
 from ..core import timing
+from ..engines.mujoco import engine, read, tree_with_sites
 from ..engines.mujoco.calls import loops
+from ..engines.mujoco.smaller import changed
 from ..experiments.quantities import QUANTITIES, Quantity
 from ..judge.agree import closest, share_of
 from ..judge.entries import Entries, unit
@@ -19,6 +23,7 @@ from ..judge.scale import FACTOR
 from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import SEED
+from ..robots.file import robot_of
 from ..run.reference import Compared
 from .programs import Array, CProgram, NotRun, Program, States, WrongProgram
 
@@ -26,6 +31,8 @@ ROUNDS = 20  # of timing
 STEPS = 1e-3, 1e-2  # dt, s
 OF_EXACT = 1e-30  # of the largest exact value: what rounding may leave there of one that is zero
 OTHER = " (p)"  # after a quantity: with other values of the parameters
+LENGTH = 0.1  # m: how far a mass is moved for them
+Values = Mapping[str, Array]  # of arguments by name
 
 
 class Row(NamedTuple):
@@ -102,7 +109,7 @@ class Judge:
 
 def checked(
     compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool,
-    other: Compared | None = None, values: Mapping[str, Array] | None = None,
+    other: Compared | None = None, values: Values | None = None,
 ) -> tuple[Outcome, Program | None]:  # fmt: skip
     """Run a program at random states; a float32 program is asked at states that float32 has.
 
@@ -140,6 +147,40 @@ def worst_of(difference: Array, tolerance: Array) -> tuple[float, float]:
     """The difference with the largest share of its tolerance, and the share; inf where it is no number."""
     at = closest(difference, tolerance)
     return abs(float(difference[at])), float(share_of(np.abs(difference), tolerance)[at])
+
+
+def with_sites(compared: Compared) -> Compared:
+    """The same, with the frames of the file's bodies and sites as sites of the Tree."""
+    if compared.reading is None:
+        return compared
+    tree = tree_with_sites(compared.reading)
+    return compared._replace(robot=replace(compared.robot, tree=tree))
+
+
+def other_values(parameters: Parameters) -> Values:
+    """Random values near the model's; masses of a payload are some kg."""
+    rng, values = np.random.default_rng(SEED), {}
+    for name, stated in parameters.values.items():
+        part, _ = parameters.places.get(name, ("gravity", 0))
+        value = np.array(stated)
+        if part == "mass":
+            value = (value + name.startswith(PAYLOAD)) * rng.uniform(0.5, 1.5)
+        elif part == "inertia":
+            root = rng.uniform(-LENGTH, LENGTH, (3, 3))  # of the second moment of 1 kg
+            second = root @ root.T
+            tensor = np.trace(second) * np.eye(3) - second
+            value = np.array([tensor[place] for place in PLACES])
+        else:
+            value = value + rng.uniform(-LENGTH, LENGTH, value.shape)
+        values[name] = value
+    return values
+
+
+def with_values(compared: Compared, parameters: Parameters, values: Values) -> Compared:
+    """What is compared, from the file with these values."""
+    reading = read(changed(compared.mujoco.source, compared.robot.tree, parameters, values))
+    shown = compared.robot.name
+    return with_sites(Compared(compared.reference, robot_of(reading, shown), engine(reading), reading))
 
 
 def times(

@@ -81,13 +81,13 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
     interrupt.Now.line = "interrupted; nothing was written"
     from ..engines.mujoco import ModelError  # imports are slow
     from ..run.reference import compared_with
-    from . import checks, parameters, programs
+    from . import checks, programs
 
     path, words = options.mjcf, (options.parameters or "").replace(", ", ",")
     try:
         reference = "model" if path or words else None
         compared = compared_with(reference, path or str(ARM.mjcf), floating=options.floating)
-        compared = parameters.with_sites(compared)
+        compared = checks.with_sites(compared)
     except ModelError as error:
         raise Refused(error) from None
     robot, name = compared.robot, options.name or identifier(Path(options.mjcf or "arm").stem)
@@ -114,8 +114,8 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
         terminal.show(f"runs what was written, at {STATES} states")
         chosen = Parameters(robot.tree, named)
         stated = {x: np.array(value) for x, value in chosen.values.items()}
-        values = parameters.other_values(chosen)
-        other = parameters.with_values(compared, chosen, values) if values else None
+        values = checks.other_values(chosen)
+        other = checks.with_values(compared, chosen, values) if values else None
         arguments = Path(folder), name, robot.tree, quantities, options.float, stated, chosen
         make = partial(programs.PROGRAMS[options.to], *arguments)
         outcome, program = checks.checked(compared, make, quantities, STATES, options.float, other, values)

@@ -81,7 +81,7 @@ class Drive:
         return any(each.feeds_back and not (each.off or each.refused) for each in self.actuators)
 
     def control(self, posture: str, lengths: Sequence[float]) -> np.ndarray:
-        """u of each actuator at a posture, within its range: that of the keyframe, else the target is the posture.
+        """u of each actuator at a posture, within its range: the keyframe's, else the target is the posture.
 
         lengths: of the transmissions there.
         """

@@ -71,7 +71,7 @@ CLAIMS = Claims(
 
 
 def landmarks(q: np.ndarray) -> list[Any]:
-    """Shoulder, elbow and finger tips in the world, vectors of numbers or arrays (times,), at q (times, 3)."""
+    """Shoulder, elbow and finger tips in the world, of numbers or arrays (times,), at q (times, 3)."""
     return tmt.arm.points(list(q.T))
 
 

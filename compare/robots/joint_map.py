@@ -183,7 +183,7 @@ class Matched(NamedTuple):
 
 
 def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
-    """The joints of a tree for those of `whose` reference: by name, else by place, axis and type. Unmatched."""
+    """The joints of a tree for those of a reference: by name, else by place, axis and type. Unmatched."""
     from scipy.optimize import linear_sum_assignment  # slow import
 
     pairs = same_names(reference.joint_names, tree.joint_names)

@@ -21,7 +21,7 @@ MOST_NUMBERS = 2_000_000  # maximum size of T_b of all random states
 
 @dataclass(eq=False)
 class Sample:
-    """States q (states, nq) rad, qd rad/s, tau N m (states, nv), exact values for the first `exact_states`."""
+    """States q (states, nq), qd, tau (states, nv), with exact values for the first `exact_states`."""
 
     tree: tmt.Tree
     name: str

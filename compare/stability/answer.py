@@ -135,20 +135,23 @@ class Asked(NamedTuple):
     in_runs: bool = True
 
 
-def answer(posture: Posture, contacts: bool, reading: Reading, asked: Asked) -> PlaceAnswer:
-    """All that is asked of a posture as it stands, or in the air if that is another place: no rows if it is not."""
-    place: Place | None = standing_at(reading, posture)
-    if place and not contacts:  # its models take memory: it is not held longer
-        place = in_the_air_at(place)
-    if place is None:
-        return PlaceAnswer([], {}, [])
+def answers(posture: Posture, reading: Reading, asked: Asked, air: bool = True) -> list[PlaceAnswer]:
+    """All that is asked of a posture: as it stands, and in the air if that is another place."""
+    standing = standing_at(reading, posture)
+    found, other = [answer(standing, asked)], in_the_air_at(standing) if air else None
+    del standing  # its models take memory
+    return [*found, answer(other, asked)] if other else found
+
+
+def answer(place: Place, asked: Asked) -> PlaceAnswer:
+    """All that is asked of a place."""
     rows, curves, changes = [], {}, []
     for integrator in asked.integrators:
         row, found = limit_row(place, integrator, asked)
         rows.append(row)
         if asked.drawn and row.is_known:
             curves[integrator] = found.curve
-        if contacts and integrator == asked.integrator and row.stable_at_file_dt is False:
+        if place.contacts and integrator == asked.integrator and row.stable_at_file_dt is False:
             changes = cures(runs_of(place, found, integrator, asked.dt), asked.dt)
     return PlaceAnswer(rows, curves, changes)
 
@@ -185,7 +188,11 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     if row.is_known:
         row.stable_at_file_dt = dt <= row.longest
     if row.stable_at_file_dt and asked.in_runs and integrator == asked.integrator and row.limit != "moving":
-        row.start_dt = StartRuns(place, integrator).longest(dt, row.longest) if place.contacts else None
+        row.start_dt = (
+            StartRuns(place.reading, place.posture, integrator, place).longest(dt, row.longest)
+            if place.contacts
+            else None
+        )
     return row, found
 
 
@@ -201,7 +208,7 @@ def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
     shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
     if row.limit == "moving":
         shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep=0.0)
-        row.creep = shown.speed_after(runs.LIMIT_PUSHES[0], shown.fine, runs.lasting(shown.fine))
+        row.creep = shown.fine_speed(runs.LIMIT_PUSHES[0])
         row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
     row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)
     if row.limit != "moving" and row.file_dt <= row.longest:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..engines.mujoco.names import integrator_by_name
 from ..engines.mujoco.reading import read
-from .answer import Asked, StepLimitRow, answer, integrators_at_rest
+from .answer import Asked, StepLimitRow, answers, integrators_at_rest
 from .place import posture_of, postures_of
 
 __all__ = ["StepLimitRow", "step_limits"]
@@ -70,4 +70,4 @@ def step_limits(
     names = [integrator_by_name(name) for name in integrators or integrators_at_rest()]
     asked = Asked(dt or reading.dt, reading.integrator, names, in_runs=in_runs)
     place = posture_of(posture, reading) if posture is not None else postures_of(reading)[0]
-    return [row for contacts in (True, False) for row in answer(place, contacts, reading, asked).rows]
+    return [row for found in answers(place, reading, asked) for row in found.rows]

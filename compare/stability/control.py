@@ -14,11 +14,13 @@ import numpy as np
 
 from ..engines.mujoco.step import NUDGE, Step
 from ..engines.mujoco.variants import Servo, held_servos, with_servos
-from .growth import GROWN, LASTS, MOST_STEPS, SMALL_PUSH, apart, has_grown, pushed, speeds_of
+from .growth import LASTS, MOST_STEPS, push_of
 from .rest import Rest, rest_near
 
 MOST_PERIOD = 0.5  # s
 MOST_DELAYED = 5  # periods: the longest delay that is tried
+SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
+GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 CREPT = 30.0  # fold, of the push at the start
 AT_ONE = 2e-4  # the distance from 1 of a factor that counts as 1: of what nothing holds
 LEAST_PERIODS = 40  # of a run
@@ -74,13 +76,17 @@ class Controlled(NamedTuple):
         step, factor = self.rest.step, self.factor(steps, delay)
         periods = max(LEAST_PERIODS, np.log(GROWN) / np.log(factor) if factor > 1.0 else 0.0)
         count = int(min(max(LASTS / self.dt, periods * steps), MOST_STEPS))
-        plain, moved = (
-            step.run_program(start, self.servos, count, steps, delay)
-            for start in (self.rest.state, pushed(self.rest, SMALL_PUSH))
-        )
-        sizes = apart(moved, speeds_of(plain))
-        least = 0.0 if factor > 1.0 else CREPT * SMALL_PUSH  # less may be what friction lets creep
-        return has_grown(sizes, count) and (len(sizes) < count or bool(sizes[-1] > least))
+        starts = (self.rest.state, step.moved(self.rest.state, push_of(step, self.rest.state, SMALL_PUSH)))
+        runs = (step.run_program(start, self.servos, count, steps, delay) for start in starts)
+        plain, moved = ([data.qvel.copy() for data in run] for run in runs)
+        if min(len(plain), len(moved)) < count:
+            return True
+        sizes = np.abs(np.subtract(plain, moved)).max(axis=1) / SMALL_PUSH
+        if not sizes.max() <= GROWN:
+            return True
+        early, late = sizes[count // 4 : count // 2].max(), sizes[3 * count // 4 :].max()
+        least = 0.0 if factor > 1.0 else CREPT  # less may be what friction lets creep
+        return bool(late > GROWING * max(early, 1.0) and sizes[-1] > least)
 
 
 def longest(holds: Callable[[int], bool], first: int, most: int) -> int | None:

@@ -1,9 +1,7 @@
 """What grows at a rest: eigenvalues of a step that noise of differences does not explain, and small pushes in runs."""
 
-from collections.abc import Iterable
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 from scipy.linalg import eig
 
@@ -15,9 +13,7 @@ OTHER_NUDGE = NUDGE / 3.0  # of the differences that show the noise
 NOISE_TIMES = 3.0  # fold, of the observed noise: what does not exceed it may be noise
 NOISE_LEAST = 1e-10  # of an entry of the derivative
 GROWS = 0.1  # 1/s: a rate below is a drift or a creep, of which a run of 4 s shows nothing
-SMALL_PUSH = 1e-7  # rad/s or m/s: deviations whose growth is judged
 LASTS, MOST_STEPS = 4.0, 20_000  # duration of a run, s; its most steps
-GROWN, GROWING = 1e3, 3.0  # fold: of the speed at the start; from the second to the last quarter
 
 
 class Growth(NamedTuple):
@@ -60,11 +56,6 @@ def growth(rest: Rest) -> Growth:
 # runs
 
 
-def pushed(rest: Rest, push: float) -> np.ndarray:
-    """The state at rest with a push, rad/s or m/s, of every speed, this way or that by chance, and a little of activations."""
-    return rest.step.moved(rest.state, push_of(rest.step, rest.state, push))
-
-
 def push_of(step: Step, state: np.ndarray, push: float, way: int = 0) -> np.ndarray:
     """The deviation of a push, (n,); activations, which may have any unit, stay within their ranges. way: of its signs."""
     nv, by = step.model.nv, np.zeros(step.size)
@@ -75,26 +66,3 @@ def push_of(step: Step, state: np.ndarray, push: float, way: int = 0) -> np.ndar
         if place >= 2 * nv:
             by += ahead if signs[place] > 0.0 or not behind.any() else behind
     return by
-
-
-def speeds_of(run: Iterable[mujoco.MjData]) -> np.ndarray:
-    """The speeds after each step of a run, (steps, nv)."""
-    return np.array([data.qvel.copy() for data in run])
-
-
-def apart(run: Iterable[mujoco.MjData], plain: np.ndarray) -> np.ndarray:
-    """The largest difference of a speed after each step from that of the run without a push, until that is large."""
-    sizes = []
-    for data, speeds in zip(run, plain):
-        sizes.append(np.abs(data.qvel - speeds).max())
-        if not sizes[-1] <= GROWN * SMALL_PUSH:
-            break
-    return np.array(sizes)
-
-
-def has_grown(sizes: np.ndarray, steps: int) -> bool:
-    """Whether a small push has grown: the run was broken off, or its last quarter is faster than its second."""
-    if len(sizes) < steps or not sizes[-1] <= GROWN * SMALL_PUSH:
-        return True
-    early, late = sizes[steps // 4 : steps // 2].max(), sizes[3 * steps // 4 :].max()
-    return bool(late > GROWING * max(early, SMALL_PUSH))

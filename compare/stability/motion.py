@@ -11,6 +11,7 @@ from .place import Place
 RUN_FOR = 4.0  # s: of the run that may break off
 LASTS, LEAST_STEPS, MOST_STEPS = 0.5, 20, 500  # s: of the deviations, and between which numbers of steps
 FINER = 8  # fold: of the steps that stand for the exact motion
+MOST_RATE = 700.0  # 1/s: so that a factor remains a number
 FASTER, FASTER_BY = 1.5, 1.0  # fold, and by at least, 1/s: by the step alone
 
 
@@ -29,6 +30,15 @@ class MotionRow(Row):
     lasts: float = column("s")
     failed_at: float | None = column("s")
     passed: bool
+
+    @property
+    def factor(self) -> float:
+        """By which a deviation grows in a second."""
+        return float(np.exp(min(self.rate, MOST_RATE)))
+
+    @property
+    def exact_factor(self) -> float:
+        return float(np.exp(min(self.exact_rate, MOST_RATE)))
 
 
 def motion(place: Place, dt: float, integrator: str) -> MotionRow:

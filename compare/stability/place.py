@@ -193,7 +193,10 @@ def beyond_saddles(model: mujoco.MjModel, state: np.ndarray) -> np.ndarray:
     """Where a model sinks to from a state, if that is a saddle; else the state."""
     dt = min(model.opt.timestep, 1e-3)
     for _ in range(MOST_SADDLES):
-        coarse, fine = (tried(model, state, step, "implicitfast") for step in (dt, dt / FINE))
+        coarse = tried(model, state, dt, "implicitfast")
+        if not coarse.growth.rate:  # the usual case: a finer step need not be tried
+            return state
+        fine = tried(model, state, dt / FINE, "implicitfast")
         if not is_saddle(coarse, fine):
             return state
         along = fine.growth.shape[: model.nv].real

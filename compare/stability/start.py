@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..engines.mujoco.reading import Reading
 from ..engines.mujoco.step import Step, WholeRun, distance, start_of, whole_run
 from ..engines.mujoco.variants import of_base
 from ..robots.case import SEED
 from .limits import COARSER, LONGEST, bisected
-from .place import Place
+from .place import Place, Posture, standing_at
 from .rest import RELAXED_STEPS, rest_near
 from .runs import BELOW, FAR, WITHIN
 
@@ -36,15 +37,21 @@ class Moved(NamedTuple):
 
 @dataclass(frozen=True)
 class StartRuns:
-    """Runs of a file from a posture itself."""
+    """Runs of a file from a posture itself. stands: where it rests, if that is known; else it is found when it is asked."""
 
-    place: Place
+    reading: Reading
+    posture: Posture
     integrator: str
+    stands: Place | None = None
+
+    @cached_property
+    def place(self) -> Place:
+        return self.stands or standing_at(self.reading, self.posture)
 
     @cached_property
     def start(self) -> np.ndarray:
         """The state of the posture, pushed a little."""
-        reading, posture = self.place.reading, self.place.posture
+        reading, posture = self.reading, self.posture
         push = PUSH * np.random.default_rng(SEED).normal(size=reading.model.nv)
         q = np.array(posture.q) if posture.q else None
         return start_of(reading.model, reading.drive, posture.key, push, q)
@@ -62,13 +69,13 @@ class StartRuns:
 
     def run(self, dt: float, lasts: float) -> WholeRun:
         with np.errstate(over="ignore", invalid="ignore"):
-            return whole_run(self.place.reading.model, self.start, dt, self.integrator, lasts, PARTS)
+            return whole_run(self.reading.model, self.start, dt, self.integrator, lasts, PARTS)
 
     def until_rest(self, dt: float) -> tuple[WholeRun, float]:
-        """A run at a step, and how long it lasts, s: longer, where it has not come to rest."""
+        """A run at a step, and how long it lasts, s: longer, where it has not come to rest, if that takes few steps."""
         lasts = float(np.clip(LASTS, LEAST_STEPS * dt, MOST_STEPS * dt))
         run = self.run(dt, lasts)
-        if not (is_calm(run) or run.failed_at):
+        if not (is_calm(run) or run.failed_at) and LONGER * lasts <= MOST_STEPS * dt:
             lasts *= LONGER
             run = self.run(dt, lasts)
         return run, lasts

@@ -191,12 +191,6 @@ def test_a_coefficient_that_nothing_explains_is_told_with_both_numbers():
     assert f"{detail.yours:g}" in found.sentence()
 
 
-def test_the_arguments_of_bias_exchanged():
-    assert not told({}).differs
-    (cause,) = told({}, lambda q, qd: tmt.bias(qd, q, TREE)).causes
-    assert (cause.place, cause.explains) == ("arguments of bias", "exchanged, bias(qd, q)")
-
-
 @pytest.mark.parametrize("size", [1e-12, np.inf])
 def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     noise, right = np.random.default_rng(1).normal(size=(len(RODS), 5)), values(TREE, RODS, SPEEDS)

@@ -3,14 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
-from files import STL
+from files import STL, URDF
 
 import tmt
 from compare.engines import RECORDS
 from compare.engines.outside import Outside
-from compare.engines.outside.file import OtherJoints, Unread
+from compare.engines.outside.file import File, OtherJoints, Unread, Unwritten
 from compare.experiments.engines import add_not_asked, names_of_free
-from compare.experiments.engines.causes import OF_ENGINES
+from compare.experiments.engines.causes import OF_ENGINES, joints_lost
 from compare.experiments.engines.readings import compare_numbers
 from compare.experiments.engines.tables import EnginesResult
 from compare.run.reference import compared_with
@@ -202,7 +202,7 @@ def kinds_named(engine, path):
     robot, result = compared_with("model", str(path)).robot, EnginesResult("engines")
     result.tables["engines_read"] = []
     try:
-        compare_numbers(result, robot, engine, Outside(engine).of(robot.case()).reading)
+        compare_numbers(result, robot, RECORDS[engine], Outside(engine).of(robot.case()).reading)
     except OtherJoints as error:
         add_not_asked(result, robot, engine, error)
     causes = [note.values["cause"] for note in result.notes if "cause" in note.values]
@@ -224,9 +224,14 @@ def test_a_cause_is_confirmed_by_the_engine_itself(kind, engine, text, ask, stat
     assert kinds_named(engine, path) == {kind}
 
 
+def test_a_urdf_has_none_of_these_causes(tmp_path):
+    path = file_of(tmp_path, URDF).rename(tmp_path / "robot.urdf")
+    assert joints_lost(RECORDS["pinocchio"], File(path, ("j",), ("hinge",)), 0) is None
+
+
 def test_each_cause_that_an_engine_can_have_has_a_script():
-    known = {(kind, engine) for engine, kinds in OF_ENGINES.items() for kind in kinds}
-    assert known == {(kind, engine) for kind, engine, *_ in CASES}
+    known = {(kind, label) for label, kinds in OF_ENGINES.items() for kind in kinds}
+    assert known == {(kind, RECORDS[engine].label) for kind, engine, *_ in CASES}
 
 
 @pytest.mark.parametrize("engine", ("drake", "pinocchio", "newton"))
@@ -324,3 +329,30 @@ def test_pinocchio_applies_the_armature_of_a_free_body_to_its_own_speeds(tmp_pat
         assert np.allclose(moved, data.qacc[:3]) == is_same
         robot = compared_with("model", str(path)).robot
         assert names_of_free(robot) == [] if is_same else ["b"]
+
+
+def test_pinocchio_has_no_springs_and_applies_no_damping(tmp_path):
+    skip_unless_installed("pinocchio")
+    import pinocchio as pin
+
+    path = file_of(tmp_path, ARM.format("", '<joint name="j" axis="0 1 0" stiffness="9" damping="2"/>', ""))
+    model, accelerations = pinocchio(path), []
+    for damping in (0.0, 5.0):
+        model.damping = np.array([damping])
+        accelerations.append(pin.aba(model, model.createData(), *np.eye(3)[:, :1]))
+    assert accelerations[0] == accelerations[1] and not any("stiffness" in name for name in dir(model))
+    reading = Outside("pinocchio").of(compared_with("model", str(path)).robot.case()).reading
+    assert reading["lacking"] == ("damping", "stiffness") and "stiffness" not in reading["read"]
+
+
+def test_what_a_urdf_cannot_state_is_no_refusal_of_the_engine(tmp_path):
+    """A ball, a joint beside a free base, and the armature of a free body."""
+    skip_unless_installed("pybullet")
+    beside = FREE.replace(
+        "</worldbody>", f'<body name="c">{HINGE}{INERTIAL.format("0 0 1")}</body></worldbody>'
+    )
+    ball = ARM.format("", '<joint name="j" type="ball"/>', "")
+    for text in (beside, ball, FREE.replace("damping", "armature")):
+        robot = compared_with("model", str(file_of(tmp_path, text))).robot
+        with pytest.raises(Unwritten):
+            Outside("pybullet").of(robot.case()).reading  # noqa: B018

@@ -3,28 +3,16 @@
 import numpy as np
 import pytest
 from crane import crane
-from edited import XML
 from files import case_of
 from models import PATHS
 from trees import random_states
 
 import tmt
 from compare.engines.mujoco import calls, engine, parse, read
-from compare.engines.mujoco.differences import left_to_itself, transition
+from compare.engines.mujoco.calls import left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
-
-REST = np.zeros(3)
-
-
-def test_a_diverged_run_is_not_reset_where_the_file_allows_it(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert XML.count(' autoreset="disable"') == 1
-    both = (parse(text, tmt.ARM).of(ARM.case()) for text in (XML.replace(' autoreset="disable"', ""), XML))
-    lenient, strict = (of.run(REST, np.full(3, 1e3), REST, 10.0, 200, "RK4") for of in both)
-    assert not np.isfinite(lenient.q[-1]).any() and np.array_equal(lenient.q, strict.q, equal_nan=True)
-    assert lenient.ended == strict.ended and list(tmp_path.iterdir()) == []
 
 
 def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):

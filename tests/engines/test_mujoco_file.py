@@ -106,6 +106,13 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
         assert lighter.ntexdata == 0 < whole.ntexdata
 
 
+def test_the_rotor_of_a_joint_stays_where_a_tendon_of_its_name_goes():
+    rotor = '<actuator><motor joint="t" armature="0.1"/><motor tendon="t"/></actuator>'
+    named = mjcf(TWO, after=TENDON.format("") + rotor).replace('"j"', '"t"')
+    model = Source(named).without({}, bare=True)
+    assert model.ntendon == 0 and model.actuator_armature.tolist() == [0.1]
+
+
 def test_what_never_moves_has_its_part_of_a_total_mass():
     mesh = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
     still = '<body><geom type="mesh" mesh="m"/></body>'

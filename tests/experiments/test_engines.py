@@ -224,10 +224,9 @@ def test_an_engine_without_a_function_is_not_judged_by_it():
 
 
 @pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature"))
-def test_a_number_as_read_just_inside_and_just_outside(number, monkeypatch):
+def test_a_number_as_read_just_inside_and_just_outside(number):
     """Masses and moments are checked; a number that an engine drops or sets otherwise is a finding."""
     stated = numbers_of(ARM.tree)
-    monkeypatch.setitem(engines.RECORDS, "other", RECORDS["float64"])
     for off, differs in ((60.0, False), (70.0, True)):
         result, read = EnginesResult("engines"), {name: values.copy() for name, values in stated.items()}
         result.tables["engines_read"] = []
@@ -236,7 +235,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number, monkeypatch):
         read[number][..., -1] += off * RECORDS["float64"].eps * size * (differs or not is_none)
         reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}, "copied": None,
                    "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
-        compare_numbers(result, ARM, "other", reading)
+        compare_numbers(result, ARM, RECORDS["float64"], reading)
         failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
         assert [check.quantity for check in result.checks if not check.passed] == failed
         assert [row.number for row in result.tables["engines_read"][:1]] == [number] * differs

@@ -1,6 +1,7 @@
 """Which engine: servos, batches, times, the reference, the cheapest method, --engines."""
 
 import dataclasses
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,8 +12,9 @@ from compare.core.errors import Refused
 from compare.engines import RECORDS
 from compare.engines.outside import Outside, servos_of
 from compare.engines.outside.bodies import numbers_of
+from compare.engines.outside.file import EngineError, TooLong
 from compare.engines.outside.model import FROM_FILE
-from compare.experiments.engines import rows, servos
+from compare.experiments.engines import integrators, rows, servos
 from compare.experiments.engines.answer import cheapest_engine, cheapest_of
 from compare.experiments.engines.integrators import step_of
 from compare.experiments.engines.motion import free_scene
@@ -92,12 +94,48 @@ def test_the_cheapest_method_is_that_of_the_engines_own_time():
     assert fields["within_1e_6"] is None and (fields["floor"], fields["floor_method"]) == (0.9e-3, "slow")
 
 
+@pytest.mark.parametrize(
+    "errors, is_floor",
+    (
+        ((1e-3, 5e-4), False),
+        ((1e-3, 6e-4), True),
+        ((1e-5, 2e-5, 1e-6), True),
+        ((1.0, 1.0, 1e-3), False),
+        ((1e-6,), False),
+    ),
+)
+def test_a_floor_is_where_errors_fall_no_further(errors, is_floor):
+    """Else the smallest error is that of the last run; whether a finer one was left out is said of it."""
+    rows = [row("m", error, 1.0) for error in errors]
+    rows[-1].finer_left_out = True
+    fields = cheapest_of(rows, 1.0)
+    assert fields["floor"] == min(errors) and fields["floor_reached"] == is_floor
+    assert fields["finer_left_out"] == (not is_floor)
+
+
 def test_the_cheapest_engine_is_that_of_the_least_cost_among_those_that_reach_an_error():
     costs = {None: 1.0, "rk4": 3.0, "RK4": 2.0}
     rows = [SimpleNamespace(within_1e_3=name, within_1e_3_cost=cost) for name, cost in costs.items()]
     assert (
         cheapest_engine(rows, "1e_3") == (rows[2], "RK4", 2.0) and cheapest_engine(rows[:1], "1e_3") is None
     )
+
+
+def test_an_engine_that_does_not_answer_in_time_is_asked_nothing_more(setup, monkeypatch):
+    """Another error of a method is said, and the next method tried."""
+    asked, result = [], EnginesResult("engines")
+    monkeypatch.setattr(integrators, "compare_steps", lambda *arguments: None)
+    methods = len(setup.engines["mujoco"].methods)
+    for error, count in ((EngineError("no"), methods), (TooLong("late"), methods + 1)):
+
+        def fail(*arguments, error=error):
+            asked.append(arguments)
+            raise error
+
+        monkeypatch.setattr(integrators, "add_runs", fail)
+        with pytest.raises(TooLong) if isinstance(error, TooLong) else nullcontext():
+            integrators.compare_methods(result, setup, setup.engines["mujoco"])
+        assert len(asked) == count
 
 
 @pytest.mark.parametrize("dt, step", [(0.003, 2.0**-9), (0.002, 2.0**-9), (0.1, 2.0**-7)])
@@ -137,7 +175,7 @@ def test_a_cause_is_named_where_the_engine_has_what_follows_from_it(tmp_path):
         reading = {"read": stated | {"gravity": np.array(gravity)}, "stated": stated, "mended": {"gravity": True}, "copied": why,
                    "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
         result = EnginesResult("engines", tables={"engines_read": []})
-        compare_numbers(result, robot, RECORDS["drake"], reading)
+        compare_numbers(result, robot, RECORDS["newton"], reading)
         (cause,) = {row.cause for row in result.tables["engines_read"]}
-        named.append((cause, result.readers["Drake"].differing))
+        named.append((cause, result.readers["Newton"].differing))
     assert named == [("option_gravity gravity", ["refused", "gravity"]), (None, ["joints", "gravity"])]

@@ -16,8 +16,8 @@ import tmt
 from compare.__main__ import main
 from compare.experiments.quantities import QUANTITIES as COMPARED
 from compare.export import checks
+from compare.export.checks import with_sites, with_values
 from compare.export.command import FILES, identifier
-from compare.export.parameters import with_sites, with_values
 from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, WrongProgram
 from compare.robots.arm import ARM
 from compare.run.reference import compared_with

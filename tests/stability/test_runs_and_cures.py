@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small import HOLDING, INERTIA, KINDS, STANDING, hinge, limit_of, place_of, rest_of, two
+from small import HOLDING, INERTIA, KINDS, STANDING, hinge, limit_of, place_of, rest_of, sphere, two
 
 from compare.engines.mujoco.step import Step
 from compare.engines.mujoco.variants import (
@@ -21,7 +21,7 @@ from compare.stability.control import controlled
 from compare.stability.growth import growth, push_of
 from compare.stability.limits import Tried, tried
 from compare.stability.motion import motion
-from compare.stability.runs import USUAL_PUSH, WAYS, Runs, upwards
+from compare.stability.runs import USUAL_PUSH, WAYS, Runs, Shown, lasting, upwards
 
 WITH_KV = hinge(20.0, 5.0)
 FOOT = STANDING.format(cone="elliptic", condim=3)
@@ -94,11 +94,57 @@ def test_the_first_step_at_which_the_files_run_fails_is_found_wherever_the_deriv
     )
 
 
+@pytest.mark.parametrize(
+    "third, last, decays", [(0.79, 0.63, True), (0.81, 0.6, False), (0.79, 0.64, False), (1.9, 1.5, False)]
+)
+def test_a_speed_that_calms_down_loses_a_fifth_in_each_quarter(third, last, decays):
+    shown = Shown(0.1 * np.array([9.0, 0.1, 1.0, 0.5, 0.5, third, 0.2, last]))
+    assert shown.decays is decays and shown.speed == 0.1 * last
+    assert not Shown(20.0 * shown.eighths).decays  # it is fast
+
+
+def test_a_slow_decay_is_a_rest_and_what_never_ends_is_none():
+    """A servo that is damped little swings down in half a minute."""
+    for kv, calm in ((0.0, False), (0.04, True)):
+        weak = runs_of(hinge(20.0, kv, integrator="implicitfast"), "implicitfast")
+        start = Step(weak.model, 1e-3, "Euler").moved(weak.state, np.array([2e-3, 0.0]))
+        swinging = replace(weak, state=start)
+        assert swinging.shown(1e-3, 2e-3, 4.0, 0).speed > 4e-3 and swinging.is_calm(1e-3, 2e-3) is calm
+
+
+def test_what_chatters_at_fine_steps_may_do_so_faster_at_coarse_ones():
+    """A brake of limited force: to and fro with force dt / (2 inertia), unless a fine step brakes it to rest."""
+    brake = '<general joint="turn" biastype="affine" biasprm="0 0 -1000" forcerange="-0.05 0.05"/>'
+    shown = runs_of(hinge(joint='stiffness="20"', actuator=brake))
+    for dt in (2e-3, 8e-3, 3e-2):
+        assert dt / 2.0 < shown.shown(1e-3, dt, lasting(dt), 0).speed < 1.1 * dt
+        assert shown.survives(1e-3, dt) and not replace(shown, fine=5e-5).survives(1e-3, dt)
+
+
+def test_a_creep_grows_as_contacts_are_softened_to_twice_the_step():
+    """The speed of a sticking contact is proportional to its time constant."""
+    text = sphere(0.02, impratio=1.0, pull=3.0, condim=3, x="").replace('refsafe="disable"', "")
+    shown = runs_of(text)
+    fine, coarse = (shown.shown(1e-3, dt, 4.0, 0).speed for dt in (2e-3, 0.05))
+    assert coarse == pytest.approx(5.0 * fine, rel=0.01) and fine > 2e-3
+    assert shown.expected(1e-3, 0.05) == pytest.approx(coarse, rel=0.01) and shown.survives(1e-3, 0.05)
+    assert runs_of(sphere()).timeconst == np.inf
+
+
+def test_a_stop_that_a_coarse_step_softens_is_another_rest_and_no_fall():
+    stop = """<mujoco><option timestep="0.002"/><worldbody><body><geom size="0.01" pos="0.04 0 0" mass="1"/>
+      <joint name="j" axis="0 1 0" range="-90 0" damping="0.003"/></body></worldbody></mujoco>"""
+    shown, coarse = runs_of(stop, "implicitfast"), rest_of(stop, 0.12, "implicitfast")
+    assert coarse.state[1] - shown.state[1] > 0.55 and shown.all_hold(0.12)
+    fallen = Step(shown.model, 0.12, "Euler").moved(shown.state, np.array([-1.0, 0.0]))
+    assert not shown.is_at_rest(0.12, fallen, 0.5) and shown.is_at_rest(0.12, fallen, 1.01)
+
+
 class Directed(Runs):
     """Runs that hold up to a step, s, of each way of a push."""
 
-    def run(self, push, dt, lasts, way=0):
-        return 0.0 if dt <= self.state[way] else np.inf
+    def run(self, push, dt, lasts, way):
+        return Shown(np.full(8, 0.0 if dt <= self.state[way] else np.inf))
 
 
 @pytest.mark.parametrize(
@@ -119,7 +165,7 @@ def test_a_body_that_leaves_at_fine_steps_too_has_no_limit_of_the_step():
       <actuator><motor site="up" gear="0 0 1 0 0 0"/></actuator><keyframe><key qpos="0 0 9 1 0 0 0" ctrl="9.81"/></keyframe>
       </mujoco>"""
     shown = runs_of(hover)
-    assert shown.speed_after(1e-3, 0.01, 4.0) > 0.05
+    assert shown.shown(1e-3, 0.01, 4.0, 0).speed > 0.05
     assert shown.limit(0.01, np.inf) == (0.2, None)
 
 

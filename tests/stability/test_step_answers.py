@@ -8,8 +8,8 @@ from small import HOLDING, INERTIA, LEG, STANDING, hinge, two
 import compare
 from compare.engines.mujoco.reading import read
 from compare.experiments.stability import own_run
-from compare.stability.answer import Asked, StepLimitRow, answer
-from compare.stability.place import Posture, posture_of, postures_of, standing_at
+from compare.stability.answer import Asked, StepLimitRow, answers
+from compare.stability.place import Posture, posture_of, postures_of
 from compare.stability.start import StartRuns
 
 KEYS = '<keyframe><key name="low" qpos="0.3 -0.2"/><key qpos="0 0"/></keyframe>'
@@ -90,7 +90,7 @@ def test_dry_friction_holds_if_the_limit_is_lower_without_it(smooth, held):
 def test_a_curve_has_the_growth_of_the_step_of_one_hinge():
     reading = read(hinge(20.0, 5.0))
     asked = Asked(0.002, "Euler", ["Euler"], drawn=True, in_runs=False)
-    found = answer(postures_of(reading)[0], True, reading, asked)
+    (found,) = answers(postures_of(reading)[0], reading, asked)
     curve, limit = found.curves["Euler"], found.rows[0].predicted_dt
     assert all((factor > 1.0) == (dt > limit) for dt, factor in curve)
     dt, factor = curve[-1]
@@ -98,7 +98,7 @@ def test_a_curve_has_the_growth_of_the_step_of_one_hinge():
     exact = np.abs(np.linalg.eigvals(np.array([[1.0, dt], [0.0, 1.0]]) @ speeds)).max()
     assert factor == pytest.approx(exact, rel=1e-6) and exact > 1.05
     assert found.cures == []
-    unstable = answer(postures_of(reading)[0], True, reading, Asked(0.03, "Euler", ["Euler"], in_runs=False))
+    (unstable,) = answers(postures_of(reading)[0], reading, Asked(0.03, "Euler", ["Euler"], in_runs=False))
     assert {cure.change for cure in unstable.cures} >= {"less_kv", "more_armature"}
     assert unstable.rows[0].stable_at_file_dt is False
 
@@ -118,7 +118,7 @@ GO = 0.01  # s
 
 
 def starts(q, dt=GO):
-    return StartRuns(standing_at(read(TIPPING.format(dt=dt, q=q)), LEAN), "Euler")
+    return StartRuns(read(TIPPING.format(dt=dt, q=q)), LEAN, "Euler")
 
 
 @pytest.mark.parametrize("q, outcome", [(0.55, "calm"), (0.8, "alike"), (1.2, "worse")])
@@ -142,6 +142,7 @@ def test_the_longest_step_from_the_posture_itself_is_where_its_runs_change():
 
 def test_a_row_has_the_step_from_the_posture_beside_its_limit_where_it_is_lower():
     for q, lower in ((1.2, True), (0.52, False)):
-        (row,) = answer(LEAN, True, read(TIPPING.format(dt=1e-3, q=q)), Asked(1e-3, "Euler", ["Euler"])).rows
+        reading = read(TIPPING.format(dt=1e-3, q=q))
+        (row,) = answers(LEAN, reading, Asked(1e-3, "Euler", ["Euler"]), air=False)[0].rows
         assert row.stable_at_file_dt and (row.start_dt is not None) is lower
         assert not lower or row.start_dt < 0.97 * row.longest

@@ -151,6 +151,11 @@ def test_a_run_says_why_it_ended(method, start, more, says):
         assert [k for k in range(9) if k != 4 and among.ended[k]] == [] or "dt" in more or "model" in more
 
 
+def test_a_hinge_whose_motion_does_not_depend_on_its_angle_ends_at_the_limit():
+    alone = one_body([(0.0, 1.0, 0.0)], gravity=(0.0, 0.0, 0.0))
+    assert "2^49" in tmt.simulate([FAST], [50.0], [0.0], 0.1, 5, model=alone).ended
+
+
 def test_where_newton_fails_one_step_is_an_error():
     with pytest.raises(ArithmeticError, match="Newton's method"):
         one_step(METHODS["implicit_midpoint"], tmt.ARM, BENT.tolist(), [1e6] * 3, [0.0] * 3, 10.0)

@@ -9,7 +9,7 @@ from tmt import Tree
 
 from ...robots.coordinates import point_inertia
 from .. import Array, Course, EngineRecord
-from ..outside.bodies import Body, Link, Numbers
+from ..outside.bodies import Body, Link
 from ..outside.file import File, OtherJoints, OtherNames
 from ..outside.mjcf_text import original_or_copy
 from ..outside.model import ReadModel
@@ -106,16 +106,13 @@ class Model(ReadModel):
         for index, inertia in self.inertias.items():
             plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
 
-    def fields(self) -> Numbers:
-        return self.used
-
-    def set_field(self, name: str, values: Array) -> bool:
-        """Balls have no rotor and no spring, and the damping of a free body is in other axes."""
-        wrong, self.used[name] = values != self.used[name], values
+    def apply(self, name: str) -> None:
         self.settle()
+
+    def unable(self, name: str) -> Array:
+        """Balls have no rotor and no spring, and the damping of a free body is in other axes."""
         is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
-        unable = self.order.is_of_free() | (is_of_ball & (name != "damping"))
-        return name == "gravity" or not wrong[unable].any()
+        return self.order.is_of_free() | (is_of_ball & (name != "damping"))
 
     def links(self, at: State) -> list[Link]:
         from pydrake.multibody.tree import BodyIndex

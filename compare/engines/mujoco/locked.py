@@ -1,4 +1,4 @@
-"""Compiled models with joints locked, which are not there, and with bodies that are welded, or have no mass, as one."""
+"""Compiled models without locked joints, and with bodies that are welded, or have no mass, as one."""
 
 from collections.abc import Collection, Mapping
 
@@ -7,9 +7,23 @@ import numpy as np
 
 from ...robots.coordinates import point_inertia
 from .inventory import contact_pairs
-from .names import aligns, element_name, joint_name, joint_places, kind_of, parts_of, rotors, tensor
+from .names import (
+    OF_A_JOINT,
+    aligns,
+    element_name,
+    joint_name,
+    joint_places,
+    kind_of,
+    parts_of,
+    rotors,
+    tensor,
+)
 
 FROM_GEOMS = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE)
+REFERRING = {  # the types of equalities, transmissions and objects of sensors that name an element
+    "joint": (mujoco.mjtEq.mjEQ_JOINT, OF_A_JOINT, mujoco.mjtObj.mjOBJ_JOINT),
+    "tendon": (mujoco.mjtEq.mjEQ_TENDON, (mujoco.mjtTrn.mjTRN_TENDON,), mujoco.mjtObj.mjOBJ_TENDON),
+}
 PARTS_OF_FREE = [mujoco.mjtJoint.mjJNT_SLIDE] * 3 + [mujoco.mjtJoint.mjJNT_BALL]
 Positions = Mapping[str, float | tuple[float, ...]]  # of joints by name: rad, m or a quaternion
 # kg and kg m2: more than the least mass that MuJoCo compiles, less than the rounding of any other
@@ -163,16 +177,22 @@ def clear(spec: mujoco.MjSpec, removed: set[str], bare: bool) -> None:
         needless += [*spec.equalities, *(actuator for actuator in spec.actuators if not actuator.armature)]
     for element in needless:
         spec.delete(element)
-    delete_named(spec, spec.tendons if bare else ())
-    delete_named(spec, [joint for joint in spec.joints if joint.name in removed])
+    delete_named(spec, "tendon", spec.tendons if bare else ())
+    delete_named(spec, "joint", [joint for joint in spec.joints if joint.name in removed])
 
 
-def delete_named(spec: mujoco.MjSpec, elements: Collection[mujoco.MjsJoint | mujoco.MjsTendon]) -> None:
-    """Delete elements after what refers to them: the other way round MuJoCo crashes."""
-    names = {element.name for element in elements} - {""}
-    for element in (*spec.equalities, *spec.actuators, *spec.sensors):
-        fields = "name1", "name2", "target", "objname"
-        if names.intersection(getattr(element, field, "") for field in fields):
+def delete_named(
+    spec: mujoco.MjSpec, kind: str, elements: Collection[mujoco.MjsJoint | mujoco.MjsTendon]
+) -> None:
+    """Delete joints or tendons after what refers to them: the other way round MuJoCo crashes."""
+    names, (tie, target, thing) = {element.name for element in elements} - {""}, REFERRING[kind]
+    referring = [element for element in spec.equalities if element.type == tie]
+    referring += [element for element in spec.actuators if element.trntype in target]
+    referring += [element for element in spec.sensors if element.objtype == thing]
+    for element in referring:
+        if names.intersection(
+            getattr(element, field, "") for field in ("name1", "name2", "target", "objname")
+        ):
             spec.delete(element)
     for element in elements:
         spec.delete(element)
@@ -191,7 +211,7 @@ def delete_geoms(spec: mujoco.MjSpec, geoms: Collection[mujoco.MjsGeom]) -> None
 
 def delete_meshes(spec: mujoco.MjSpec) -> None:
     """Delete meshes and height fields that give no inertia, their geoms, and what may refer to these."""
-    for element in (*spec.sensors, *spec.tuples):
+    for element in (*spec.sensors, *spec.tuples, *spec.pairs):
         spec.delete(element)
     meshes = [geom for geom in spec.geoms if geom.meshname or geom.hfieldname]
     delete_geoms(spec, [geom for geom in meshes if not gives_inertia(geom)])

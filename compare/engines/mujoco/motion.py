@@ -49,7 +49,7 @@ def data_at(model: mujoco.MjModel, state: Array, whole: mujoco.MjModel) -> mujoc
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion of a whole model whose elements have names; controls are constant between times.
+    """A motion of a whole model, which smaller ones repeat; controls are constant between times.
 
     start: the state, and what acts all the time: forces, and where bodies are held. inputs: the controls of
     each actuator, (times, controls of it).
@@ -64,12 +64,14 @@ class Motion:
     def placed(self, model: mujoco.MjModel) -> mujoco.MjData:
         """The data of a model at the start."""
         data, start = mujoco.MjData(model), self.start
-        for joint in joints(model):
-            here, there = data.joint(joint), start.joint(joint)
+        whole_joints, whole_actuators = list(joints(start.model)), actuators(start.model)
+        for number, joint in enumerate(joints(model)):
+            here, there = data.joint(number), start.joint(whole_joints.index(joint))
             here.qpos[:], here.qvel[:], here.qfrc_applied[:] = there.qpos, there.qvel, there.qfrc_applied
-        for actuator in actuators(model):
-            data.actuator(actuator).ctrl[:] = self.inputs[actuator][0]
-            data.act[activations(model, actuator)] = start.act[activations(start.model, actuator)]
+        for number, actuator in enumerate(actuators(model)):
+            data.actuator(number).ctrl[:] = self.inputs[actuator][0]
+            place = activations(start.model, whole_actuators.index(actuator))
+            data.act[activations(model, number)] = start.act[place]
         data.mocap_pos[:], data.mocap_quat[:] = start.mocap_pos, start.mocap_quat
         return data
 
@@ -86,13 +88,14 @@ def actuators(model: mujoco.MjModel) -> list[str]:
 
 def inputs_of(data: mujoco.MjData, times: int) -> dict[str, Array]:
     """The controls of the data at a number of times, see Motion."""
-    return {name: np.tile(data.actuator(name).ctrl, (times, 1)) for name in actuators(data.model)}
+    names = enumerate(actuators(data.model))
+    return {name: np.tile(data.actuator(number).ctrl, (times, 1)) for number, name in names}
 
 
-def activations(model: mujoco.MjModel, actuator: str) -> slice:
+def activations(model: mujoco.MjModel, actuator: int) -> slice:
     """The place in act of an actuator."""
-    first, count = model.actuator(actuator).actadr[0], model.actuator(actuator).actnum[0]
-    return slice(max(0, first), max(0, first) + count)
+    first = max(0, model.actuator_actadr[actuator])
+    return slice(first, first + model.actuator_actnum[actuator])
 
 
 class Path(NamedTuple):

@@ -1,7 +1,7 @@
-"""A smaller file: an MjSpec without what a motion does not use, with joints locked, written as MJCF."""
+"""Files made of a file: smaller ones, without what a motion does not use; and with other inertial numbers."""
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path as File
 from shutil import copyfile
 from typing import Any
@@ -10,11 +10,13 @@ import mujoco
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from .changed import state_as_compiled
+from tmt.export.parameters import PAYLOAD, SIZES, Parameters
+from tmt.model.tree import Tree
+
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Motion, Use, joints
 from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
-from .source import Source, delete_textures, is_from_geoms
+from .source import Source, delete_textures, is_from_geoms, without_visuals
 from .variants import of_base
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
@@ -27,7 +29,7 @@ REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjEN
 
 
 def spec_with_points(source: Source, points: Iterable[str]) -> mujoco.MjSpec:
-    """A copy of the file's spec with sites at bodies with these names. ValueError for a name that no body or site has."""
+    """A copy of the file's spec with sites at bodies of these names; ValueError for a name of neither."""
     assert source.spec is not None
     spec = source.spec.copy()
     sites, bodies = ({element.name for element in elements} for elements in (spec.sites, spec.bodies))
@@ -206,7 +208,7 @@ def locked(small: Smaller, positions: Mapping[str, np.ndarray]) -> Smaller:
     numbers = {number for number, name in enumerate(joints(model)) if name in positions}
     tied = [tendon for tendon in range(model.ntendon) if numbers.intersection(joints_of(model, tendon))]
     gone = {element_name(model, "tendon", tendon) for tendon in tied}
-    delete_named(spec, [tendon for tendon in spec.tendons if tendon.name in gone])
+    delete_named(spec, "tendon", [tendon for tendon in spec.tendons if tendon.name in gone])
     with warnings.catch_warnings(action="ignore"):
         fixed = compiled_without(spec, of_parts(model, positions), bare=False)
     for tie in list(spec.equalities):
@@ -240,3 +242,48 @@ def finished(small: Smaller, motions: Iterable[Motion], dt: float, integrator: s
         state = {"qpos": data.qpos, "qvel": data.qvel, "act": data.act, "ctrl": data.ctrl}
         spec.add_key(name=motion.name, **state, **places)
     return Smaller(spec)
+
+
+def changed(
+    source: Source, tree: Tree, parameters: Parameters, values: Mapping[str, np.ndarray]
+) -> mujoco.MjModel:
+    """A file with other inertial numbers, gravity and payload; values: of the parameters by name."""
+    assert source.spec is not None
+    spec, model = without_visuals(source.spec), source.model
+    state_as_compiled(spec, model, source.bodies)
+    bodies = {element_name(model, "body", number): body for body, number in zip(spec.bodies, source.bodies)}
+    if parameters.has_payload:
+        carrier = bodies[tree.body_names[parameters.carriers[-1]]]
+        load = carrier.add_body(name=PAYLOAD)
+        mass, com, inertia = (values[f"{PAYLOAD}_{part}"] for part in SIZES)
+        state_inertial(load, mass[0], com)
+        load.fullinertia = inertia
+    for name, (part, number) in parameters.places.items():
+        if number == len(tree.mass):
+            continue
+        body = bodies[tree.body_names[number]]
+        if part == "mass":
+            body.mass = values[name][0]
+        elif part == "com":
+            body.ipos = values[name]
+        else:
+            body.iquat, body.inertia = [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+            body.fullinertia = values[name]
+    if "gravity" in values:
+        spec.option.gravity = values["gravity"]
+    return compiled(spec)
+
+
+def state_as_compiled(spec: mujoco.MjSpec, model: mujoco.MjModel, numbers: Sequence[int]) -> None:
+    """State the inertias of all bodies, whose numbers in the model are given, as they were compiled."""
+    for body, number in zip(spec.bodies[1:], numbers[1:]):
+        state_inertial(body, model.body_mass[number], model.body_ipos[number])
+        body.iquat, body.inertia = model.body_iquat[number], model.body_inertia[number]
+        body.fullinertia = np.full(6, np.nan)
+    spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
+    spec.compiler.settotalmass = -1.0
+
+
+def state_inertial(body: mujoco.MjsBody, mass: float, com: np.ndarray) -> None:
+    body.mass, body.ipos, body.explicitinertial = mass, com, True
+    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT

@@ -152,7 +152,7 @@ class Source:
 
     @cached_property
     def bare(self) -> mujoco.MjSpec:
-        """What is stated without what is only drawn, and without meshes, if they have no mass: copies are changed."""
+        """What is stated, without what is only drawn and meshes without mass: copies are changed."""
         assert self.spec is not None
         bare = without_visuals(self.spec)
         if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part

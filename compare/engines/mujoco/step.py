@@ -30,7 +30,7 @@ copies: WeakKeyDictionary[mujoco.MjModel, mujoco.MjModel] = WeakKeyDictionary()
 
 
 def takes_transition(model: mujoco.MjModel, integrator: str) -> bool:
-    """Whether mjd_transitionFD is right: it refuses RK4 and delays, and where springs yield it leaves what has yielded."""
+    """Whether mjd_transitionFD is right: it refuses RK4 and delays, and leaves what has yielded."""
     return integrator != "RK4" and not mujoco.mj_stateSize(model, REMEMBERED)
 
 

@@ -50,6 +50,7 @@ class ReadModel(ABC):
     copied: tuple[str, str] | None = None  # why it has read a copy of the file
     file: File
     order: Order
+    used: dict[str, Array]  # `fields`
     stated: Numbers  # numbers_of the Tree
     reading: Reading
 
@@ -62,20 +63,30 @@ class ReadModel(ABC):
         """Those that it gives for this robot, of QUANTITIES and "derivatives"."""
         return QUANTITIES
 
-    @abstractmethod
     def fields(self) -> Numbers:
-        """What it has read that is not of bodies, in the Tree's order.
+        """What it has read that is not of bodies, in the Tree's order; then what is set.
 
         gravity (3,) m/s2; armature, damping, stiffness (nv,); a name that is missing: it does not tell.
         """
+        return self.used
 
     def links(self, at: State) -> list[Link]:
         """Its bodies at a state, where has_links."""
         return []
 
     def set_field(self, name: str, values: Array) -> bool:
-        """Set one of `fields`; False: that is not possible."""
-        return False
+        """Set one of `fields`; False: that is not possible for all joints."""
+        is_wrong, self.used[name] = values != self.used[name], np.array(values, float)
+        self.apply(name)
+        return name == "gravity" or not (is_wrong & self.unable(name)).any()
+
+    def apply(self, name: str) -> None:
+        """Give the engine one of `used`."""
+        return None
+
+    def unable(self, name: str) -> Array:
+        """Of which speeds of the Tree the engine cannot have such a number, (nv,)."""
+        return np.zeros(self.file.coordinates.nv, bool)
 
     def set_body(self, link: Link, body: Body) -> bool:
         """Set mass, centre of mass and inertia of a link, in its axes, all 0: none; False: that is not possible."""

@@ -4,11 +4,11 @@ What a URDF cannot state is set by this program, and is no loss of the engine's.
 """
 
 from abc import abstractmethod
+from xml.etree import ElementTree
 
 import numpy as np
 
 from .. import Array
-from .bodies import Numbers
 from .file import File, Unwritten
 from .model import FROM_URDF, SteppedModel
 
@@ -29,7 +29,7 @@ class OfUrdf(SteppedModel):
             raise Unwritten(str(error)) from None
         self.file, nv = file, file.coordinates.nv
         self.load(text)
-        self.read = {"armature": np.zeros(nv), "stiffness": np.zeros(nv)}
+        self.used = {"gravity": self.gravity(), "armature": np.zeros(nv), "stiffness": np.zeros(nv)}
 
     @abstractmethod
     def load(self, text: str) -> None:
@@ -44,21 +44,33 @@ class OfUrdf(SteppedModel):
     def other_force(self, q: Array, v: Array) -> Array:
         """Of springs, and of the damping of free joints."""
         first, damping = self.file.coordinates.places.first_positions, self.stated["damping"]
-        springs = self.read["stiffness"] * (self.stated["rest"] - q)[first]
+        springs = self.used["stiffness"] * (self.stated["rest"] - q)[first]
         return np.asarray(springs - damping * v * self.order.is_of_free())
 
-    def fields(self) -> Numbers:
-        return {"gravity": self.gravity(), **self.read}
-
-    def set_field(self, name: str, values: Array) -> bool:
+    def apply(self, name: str) -> None:
         if name == "gravity":
-            self.set_gravity(values)
-            return True
-        if values[self.order.is_of_free()].any():
+            self.set_gravity(self.used[name])
+        elif self.used[name][self.order.is_of_free()].any():
             raise Unwritten(f"free joints have no {name}")
-        self.read[name] = np.array(values)
-        return True
 
     def armature_matrix(self) -> Array:
         """In the engine's order."""
-        return np.diag(self.read["armature"][self.order.v])
+        return np.diag(self.used["armature"][self.order.v])
+
+
+def without_world(text: str) -> str:
+    """A URDF whose root is the link of its floating joint; Unwritten if other joints stand on the world."""
+    robot = ElementTree.fromstring(text)
+    carried: set[str] = set()
+    for joint in robot.findall("joint"):
+        parent, child = (next(joint.iter(tag)).attrib["link"] for tag in ("parent", "child"))
+        if parent in carried or (joint.get("type") == "floating" and not carried):
+            carried.add(child)
+        elif joint.get("type") != "fixed":
+            raise Unwritten("joints stand on the world beside a free base")
+        if parent not in carried:
+            robot.remove(joint)
+    for link in robot.findall("link"):
+        if link.attrib["name"] not in carried:
+            robot.remove(link)
+    return ElementTree.tostring(robot, encoding="unicode")

@@ -17,7 +17,7 @@ from tmt.exact.many import Pairs, exact_of_many
 from ...core.check import Result
 from ...core.rows import Row, column
 from ...engines.mujoco import Mujoco
-from ...engines.mujoco.differences import Call, of_inverse, of_steps, of_transition
+from ...engines.mujoco.calls import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
 from ...engines.mujoco.step import takes_transition

@@ -90,7 +90,9 @@ def add_load(result: EnginesResult) -> None:
 def add_not_asked(result: EnginesResult, robot: Robot, engine: str, error: EngineError) -> None:
     """A row and a finding of an engine that takes no part: it refuses the file, or this program does not ask it."""
     label, reason = LABELS[engine], str(error).rstrip(".")
-    cause = joints_lost(engine, file_of(robot), error.speeds) if isinstance(error, OtherJoints) else None
+    cause = (
+        joints_lost(RECORDS[engine], file_of(robot), error.speeds) if isinstance(error, OtherJoints) else None
+    )
     result.tables["engines_read"].append(ReadRow(label, cause=cause and str(cause), why_not=str(error)))
     result.find("not_asked", why=type(error).__name__, engine=label, reason=reason, cause=cause)
     if label not in [row.engine for row in result.rows]:
@@ -101,7 +103,7 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     setup.progress(f"engines: {engine.record.label}{' compiles' * engine.record.compiles}")
     dynamics = engine.of(setup.robot.case())
     reading = dynamics.reading
-    compare_numbers(result, setup.robot, engine.name, reading)
+    compare_numbers(result, setup.robot, engine.record, reading)
     reads_another = bool(reading["mended"] or reading["lacking"]) and reading["way"] != FROM_URDF
     as_read = engine.as_read(setup.robot.case()) if reads_another else None
     compare_quantities(result, setup, engine.record, dynamics, as_read)
@@ -110,8 +112,8 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     if free and reading["way"] == FROM_FILE and "armature" not in reading["mended"] and not are_right:
         result.find("armature_of_free", engine=engine.record.label, joints=free)
     if all(reading["mended"].values()):
+        servos.follow_step(result, setup, engine, reads_another)  # soon compiled
         integrators.compare_methods(result, setup, engine)
-        servos.follow_step(result, setup, engine, reads_another)
         batches.time_batches(result, setup, engine)
 
 

@@ -1,15 +1,18 @@
 """Which engine: two verdicts of each, and the cheapest of its methods for three errors."""
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 from ...engines import LABELS
 from ...engines.outside.model import FROM_COMPILED, FROM_URDF
 from ...judge.run import movement_unit
 from ...robots.case import Case
+from ..followed import REGULAR
 from .tables import AnswerRow, EnginesResult, MethodRow
 
 TARGETS = {"1e_3": 1e-3, "1e_6": 1e-6, "1e_9": 1e-9}  # rad or m, the largest error of a motion
+FALLS = 1.8  # ratio of the errors of two runs of a method of order 1; a smaller one is that of a floor
 SAME, OTHER, NOT_SET = "same", "differs", "not set"  # verdicts on the equations
 
 
@@ -35,14 +38,11 @@ def add_answer(result: EnginesResult, case: Case | None) -> None:
     if case and runs:
         cheapest = {name: cheapest_engine(rows, name) for name in TARGETS}
         unit = movement_unit(case.coordinates)
-        about: dict[str, Any] = {
-            "scene": case.name,
-            "duration": case.duration,
-            "unit": unit,
-            "targets": TARGETS,
-        }
-        result.top.append(result.finding("cheapest", cheapest=cheapest, **about))
-        result.top += [result.finding("engine", row=row, targets=TARGETS) for row in rows]
+        about: dict[str, Any] = {"scene": case.name, "duration": case.duration, "unit": unit}
+        result.top.append(result.finding("cheapest", cheapest=cheapest, targets=TARGETS, **about))
+        result.top += [
+            result.finding("engine", row=row, targets=TARGETS) for row in rows if row.floor is not None
+        ]
 
 
 def as_read(result: EnginesResult, label: str) -> str:
@@ -70,7 +70,12 @@ def cheapest_of(runs: Sequence[MethodRow], duration: float) -> Mapping[str, Any]
         fields[f"within_{name}"] = best and best.method
         fields[f"within_{name}_cost"] = best and 1e3 * best.own_seconds / duration
     least = min(ended, key=lambda row: row.worst_error or 0.0, default=None)
-    return fields | {"floor": least and least.worst_error, "floor_method": least and least.method}
+    fields |= {"floor": least and least.worst_error, "floor_method": least and least.method}
+    errors = [row.worst_error or 0.0 for row in ended if least and row.method == least.method]
+    pairs = [pair for pair in pairwise(errors) if pair[0] < REGULAR]
+    is_reached = any(after * FALLS > before for before, after in pairs)
+    is_left_out = any(row.finer_left_out for row in runs) and not is_reached
+    return fields | {"floor_reached": is_reached, "finer_left_out": is_left_out}
 
 
 def cheapest_engine(rows: Sequence[AnswerRow], name: str) -> tuple[AnswerRow, str, float] | None:

@@ -12,7 +12,7 @@ from ...core import timing
 from ...engines import LABELS, RECORDS, Array, Engine
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.outside import OutsideDynamics
-from ...engines.outside.file import EngineError
+from ...engines.outside.file import EngineError, TooLong
 from ...robots.case import Case
 from ..setup import Setup
 from .motion import free_scene
@@ -35,6 +35,8 @@ def time_batches(result: EnginesResult, setup: Setup, engine: Engine) -> None:
         setup.progress(f"engines: {worlds} worlds, {LABELS[engine.name]}")
         try:
             seconds = add_row(result, case, engine, worlds)
+        except TooLong:
+            raise
         except EngineError as error:
             what = f"{worlds} worlds, {LABELS[engine.name]}"
             result.find("left_out", what=what, reason=str(error).rstrip("."))

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ...core.words import some_of
-from ...engines import RECORDS, Array
+from ...engines import Array, EngineRecord
 from ...engines.mujoco import read
 from ...engines.mujoco.names import joint_places
 from ...engines.mujoco.source import ModelError, Source
@@ -29,14 +29,9 @@ from .losses import LOSSES, Loss, Text, taken
 MASSES = "mass", "moments", "com", "com_moved", "inertia"
 PLACES = "com", "com_moved", "inertia", "anchor", "anchor_moved", "axis", "axis_moved"
 CLOSE, SINGLE = 1e-6, float(np.finfo(np.float32).eps)
-KEPT = (
-    "compiler",
-    "option",
-    "default",
-    "worldbody",
-    "actuator",
-)  # sections that numbers of bodies and joints follow from
-DRAWN = "material", "mesh", "hfield"  # attributes whose assets are left out
+# sections that numbers of bodies and joints follow from, and attributes whose assets are left out
+KEPT = "compiler", "option", "default", "worldbody", "actuator"
+DRAWN = "material", "mesh", "hfield"
 
 
 class Cause(NamedTuple):
@@ -57,7 +52,7 @@ class Origin:
         self.places = joint_places(self.model)
         self.meshed = {name for name, are_meshes in self.source.mesh_geoms if any(are_meshes)}  # of bodies
         self.root = ElementTree.Element("mujoco")
-        with suppress(Unread):
+        with suppress(Unread, OSError):  # a file that is not all in its text
             if file.path.suffix != ".urdf":
                 self.root = ElementTree.fromstring(whole_text(file.path))
         for section in [part for part in self.root if part.tag not in KEPT]:
@@ -107,43 +102,44 @@ class Entry(NamedTuple):
     bodies: tuple[str, ...]  # that move with that joint
 
 
-def causes_of(engine: str, file: File, reading: Reading, entries: Sequence[Entry]) -> dict[Entry, Cause]:
-    """The causes of entries, as far as one is known: losses, each with those that were found before, then what else is seen."""
-    origin, causes = origin_of(file), dict[Entry, Cause]()
-    if origin.root.find("worldbody") is not None:
-        explain_by_losses(engine, origin, reading, entries, causes)
-    finds = [SEEN[kind] for kind in OF_ENGINES.get(engine, ()) if kind in SEEN]
+Causes = dict[Entry, Cause]
+
+
+def causes_of(record: EngineRecord, file: File, reading: Reading, entries: Sequence[Entry]) -> Causes:
+    """The causes of entries, as far as one is known: losses of the text, then what else is seen."""
+    origin = origin_of(file)
+    causes = explained_by_losses(record, origin, reading, entries)
+    finds = [SEEN[kind] for kind in OF_ENGINES.get(record.label, ()) if kind in SEEN]
     for entry in [entry for entry in entries if entry not in causes]:
-        subjects = {find.__name__: find(origin, reading, entry, entries) for find in finds}
-        kind = next((kind for kind, subject in subjects.items() if subject), None)
-        if kind:
-            causes[entry] = Cause(kind, str(subjects[kind]))
+        for find in finds:
+            subject = find(origin, reading, entry, entries)
+            if subject and entry not in causes:
+                causes[entry] = Cause(find.__name__, subject)
     return causes
 
 
-def losses_of(engine: str) -> list[str]:
-    return [kind for kind in OF_ENGINES.get(engine, ()) if kind in LOSSES]
+def losses_of(record: EngineRecord, origin: Origin) -> list[str]:
+    """The kinds of what an engine leaves out of a text; none of a URDF."""
+    kinds = OF_ENGINES.get(record.label, ()) if origin.root.find("worldbody") is not None else ()
+    return [kind for kind in kinds if kind in LOSSES]
 
 
-def explain_by_losses(
-    engine: str, origin: Origin, reading: Reading, entries: Sequence[Entry], causes: dict[Entry, Cause]
-) -> None:
-    lost, is_new, eps = list[Loss](), True, RECORDS[engine].eps
-    known = losses_of(engine)
-    while is_new and len(causes) < len(entries):
-        is_new = False
-        for kind in known:
-            if LOSSES[kind] in lost:
-                continue
-            changed, source = origin.without([*lost, LOSSES[kind]])
-            numbers = numbers_without(origin, source)
-            fitting = [
-                entry for entry in entries if entry not in causes and fits(reading, numbers, eps, entry)
-            ]
-            if fitting:
-                causes |= dict.fromkeys(fitting, Cause(kind, some_of(changed)))
-                lost.append(LOSSES[kind])
-                is_new = True
+def explained_by_losses(
+    record: EngineRecord, origin: Origin, reading: Reading, entries: Sequence[Entry]
+) -> Causes:
+    """Of each loss, with those that explain others, the entries that it explains; until none explains more."""
+    causes, lost, untried = Causes(), list[Loss](), losses_of(record, origin) if entries else []
+    while untried:
+        kind = untried.pop(0)
+        changed, source = origin.without([*lost, LOSSES[kind]])
+        numbers = numbers_without(origin, source)
+        open_entries = [entry for entry in entries if entry not in causes]
+        fitting = [entry for entry in open_entries if fits(reading, numbers, record.eps, entry)]
+        if fitting:
+            causes |= dict.fromkeys(fitting, Cause(kind, some_of(changed)))
+            lost.append(LOSSES[kind])
+            untried = [kind for kind in losses_of(record, origin) if LOSSES[kind] not in lost]
+    return causes
 
 
 def numbers_without(origin: Origin, source: Source | None) -> Mapping[str, Array]:
@@ -172,10 +168,10 @@ def fits(reading: Reading, numbers: Mapping[str, Array], eps: float, entry: Entr
     return bool(not to_read[entry.place] and to_stated[entry.place] and not (to_stated & ~is_wrong).any())
 
 
-def joints_lost(engine: str, file: File, speeds: int) -> Cause | None:
+def joints_lost(record: EngineRecord, file: File, speeds: int) -> Cause | None:
     """Why an engine has this number of speeds, or None."""
     origin = origin_of(file)
-    for kind in losses_of(engine):
+    for kind in losses_of(record, origin):
         changed, source = origin.without([LOSSES[kind]])
         if changed and (source.model.nv if source else 0) == speeds:
             return Cause(kind, some_of(changed))
@@ -207,21 +203,17 @@ def mass_of_meshes(origin: Origin, reading: Reading, entry: Entry, entries: Sequ
 
 def meshed_bodies(origin: Origin, entry: Entry) -> list[str]:
     """Those of an entry that have meshes and no <inertial> in the file."""
-    stated = (
-        {body.name for body in origin.source.spec.bodies if body.explicitinertial}
-        if origin.source.spec
-        else set()
-    )
+    spec = origin.source.spec
+    stated = {body.name for body in spec.bodies if body.explicitinertial} if spec else set()
     return [name for name in entry.bodies if name in origin.meshed - stated]
 
 
 def turned_start(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
     """Positions of a free body are turned about the place that the file gives it, by the turn that it has there."""
-    model, root = (
-        origin.model,
-        origin.carriers(origin.file.names[entry.joint])[-1] if entry.number in PLACES else 0,
-    )
-    if not root or model.body_dofnum[root] != 6:
+    if entry.number not in PLACES:
+        return None
+    model, root = origin.model, origin.carriers(origin.file.names[entry.joint])[-1]
+    if model.body_dofnum[root] != 6:
         return None
     turn, shift = Rotation.from_quat(np.roll(model.body_quat[root], -1)), model.body_pos[root]
     moved = turn.apply(shift) - shift
@@ -232,7 +224,7 @@ def turned_start(origin: Origin, reading: Reading, entry: Entry, entries: Sequen
 
 def oblique_turn(origin: Origin, reading: Reading, entry: Entry, entries: Sequence[Entry]) -> str | None:
     """The axis of an axisangle is not of length 1."""
-    for body in origin.root.iter("body"):
+    for body in origin.root.iter("body") if entry.number in (*PLACES, "moments") else ():
         axis = [float(x) for x in body.get("axisangle", "0 0 1 0").split()[:3]]
         carriers = [origin.name(carrier) for carrier in origin.carriers(origin.file.names[entry.joint])]
         if abs(np.linalg.norm(axis) - 1.0) > CLOSE and body.get("name") in carriers:
@@ -255,19 +247,19 @@ SEEN = {find.__name__: find for find in (
     float32_meshes, small_inertia, oblique_turn, mass_of_meshes, turned_start, several_joints,
 )}  # fmt: skip
 FLOAT32 = float32_meshes.__name__
-# what is known of each engine, in the order in which it is tried
+# what is known of each engine, by its label, in the order in which it is tried
 OF_ENGINES: Mapping[str, Sequence[str]] = {
-    "drake": (
+    "Drake": (
         "class_without_joint", "no_springs", "springdamper", "armature_of_actuator", "passive_of_free",
         "armature_without_motor", "gravity_flag", "total_mass", "bounds", "groups", "shell_inertia", "frame", "replicate",
         FLOAT32, "mass_of_meshes", "several_joints",
     ),
-    "pinocchio": (
+    "Pinocchio": (
         "joint_pos_of_class", "armature_of_actuator", "option_gravity", "gravity_flag", "total_mass", "bounds", "groups",
         "geom_mass_of_class", "geoms_without_contacts", "fixed_root", "frame", "other_roots", "oblique_turn",
         "mass_of_meshes", "turned_start",
     ),
-    "newton": (
+    "Newton": (
         "springdamper", "armature_of_actuator", "passive_of_free", "option_gravity", "total_mass", "shell_inertia",
         "replicate", "small_inertia", "mass_of_meshes", "several_joints",
     ),

@@ -41,10 +41,10 @@ def compare_methods(result: Result, setup: Setup, engine: Engine) -> None:
             if method.scheme in METHODS and not method.adaptive:
                 compare_steps(result, setup, engine, method)
             measured = add_runs(result, setup, case, engine, method) if case else None
+        except TooLong:
+            raise
         except EngineError as error:
             result.find("left_out", what=method.label, reason=str(error).rstrip("."))
-            if isinstance(error, TooLong):
-                break
             continue
         if case and measured and method.order:
             where, note = f"{case.name}, {method.label}", f"{measured.order:.2f}"
@@ -114,6 +114,7 @@ def add_runs(
             steps.append(row.dt)
             errors.append(run.early)
         if run.seconds > LONGEST:
+            row.finer_left_out = setting is not settings[-1]
             break
     measured = order_of(steps, errors, RECORDS[engine.name].eps)
     for row in rows:

@@ -15,6 +15,8 @@ class Text:
 
     def __init__(self, root: Element) -> None:
         self.root = root
+        world = root.find("worldbody")  # whole_text has one
+        self.world = Element("worldbody") if world is None else world
         self.classes: dict[str, tuple[Element, str | None]] = {}  # with the class around
         defaults = root.findall("default")
         self.outermost = next((default.get("class", "main") for default in defaults), "main")
@@ -26,17 +28,16 @@ class Text:
         for inner in default.findall("default"):
             self.add_class(inner, inner.get("class", ""), name)
 
-    def parts(self, *tags: str) -> Iterator[tuple[Element, str]]:
-        """The elements of bodies with these tags, and their classes."""
-        for world in self.root.findall("worldbody"):
-            yield from self.parts_of(world, self.outermost, tags)
+    def parts(self, tag: str) -> list[tuple[Element, str]]:
+        """The elements of bodies with a tag, and their classes."""
+        return list(self.parts_of(self.world, self.outermost, tag))
 
-    def parts_of(self, body: Element, childclass: str, tags: Sequence[str]) -> Iterator[tuple[Element, str]]:
+    def parts_of(self, body: Element, childclass: str, tag: str) -> Iterator[tuple[Element, str]]:
         childclass = body.get("childclass", childclass)
         for part in body:
-            if part.tag in tags:
+            if part.tag == tag:
                 yield part, part.get("class", childclass)
-            yield from self.parts_of(part, childclass, tags)
+            yield from self.parts_of(part, childclass, tag)
 
     def around(self, name: str | None, tag: str) -> Iterator[tuple[str, Element | None]]:
         """A class and those around it, with what they state for a tag, or None."""
@@ -54,11 +55,6 @@ class Text:
                 return default.attrib[attribute], name
         return None, ""
 
-    @property
-    def roots(self) -> list[Element]:
-        """The bodies on the world."""
-        return [body for world in self.root.findall("worldbody") for body in world.findall("body")]
-
 
 def take(text: Text, path: str, attributes: Sequence[str]) -> list[str]:
     """Delete attributes of elements."""
@@ -75,14 +71,13 @@ def class_without_joint(text: Text) -> list[str]:
     """A class without <joint> hides those around it."""
     empty = []
     for joint, of_class in text.parts("joint"):
+        names = [name for name, _ in text.around(of_class, "joint")]
         hidden = [name for name, default in text.around(of_class, "joint") if default is None]
         for attribute, default in OF_JOINTS.items():
             _, stating = text.stated(joint, of_class, attribute)
-            between = [name for name, _ in text.around(of_class, "joint")]
-            passed = [name for name in hidden if stating and between.index(name) < between.index(stating)]
-            if passed:
+            if stating and hidden and names.index(hidden[0]) < names.index(stating):
                 joint.set(attribute, default)
-                empty.append(passed[0])
+                empty.append(hidden[0])
     return empty
 
 
@@ -121,15 +116,14 @@ def armature_without_motor(text: Text) -> list[str]:
 
 
 def geoms_without_contacts(text: Text) -> list[str]:
-    bodies = []
-    for body in text.root.iter("body"):
-        for geom in body.findall("geom"):
-            of_class = next(name for part, name in text.parts("geom") if part is geom)
-            bits = [text.stated(geom, of_class, attribute)[0] for attribute in ("contype", "conaffinity")]
-            if bits == ["0", "0"]:
-                geom.set("mass", "0")
-                bodies.append(body.get("name", ""))
-    return bodies
+    bodies = {geom: body for body in text.root.iter("body") for geom in body.findall("geom")}
+    apart = []
+    for geom, of_class in text.parts("geom"):
+        bits = {text.stated(geom, of_class, attribute)[0] for attribute in ("contype", "conaffinity")}
+        if bits == {"0"} and geom in bodies:
+            geom.set("mass", "0")
+            apart.append(bodies[geom].get("name", ""))
+    return apart
 
 
 def left_out(text: Text, tag: str) -> list[str]:
@@ -143,17 +137,19 @@ def left_out(text: Text, tag: str) -> list[str]:
 
 def other_roots(text: Text) -> list[str]:
     """The bodies on the world but the first."""
-    first, *others = text.roots
-    for world in text.root.findall("worldbody"):
-        for body in world.findall("body"):
-            if body is not first:
-                world.remove(body)
+    others = text.world.findall("body")[1:]
+    for body in others:
+        text.world.remove(body)
     return [body.get("name", "") for body in others]
 
 
 def fixed_root(text: Text) -> list[str]:
     """The pose of bodies on the world that have no joint."""
-    fixed = [body for body in text.roots if not {part.tag for part in body} & {"joint", "freejoint"}]
+    fixed = [
+        body
+        for body in text.world.findall("body")
+        if not {part.tag for part in body} & {"joint", "freejoint"}
+    ]
     posed = [body for body in fixed if set(POSE) & body.attrib.keys()]
     taken(posed, POSE)
     return [body.get("name", "") for body in posed]

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.check import About
 from ...core.words import some_of
-from ...engines import RECORDS, EngineRecord
+from ...engines import EngineRecord
 from ...engines.outside.bodies import size_of
 from ...engines.outside.file import File, OtherJoints
 from ...engines.outside.mjcf_text import REFUSED
@@ -32,9 +32,8 @@ OF_COPIES = {REFUSED: ["refused"], OtherJoints.__name__: ["joints"]}
 AS_READ = "as read"  # checks of numbers
 
 
-def compare_numbers(result: EnginesResult, robot: Robot, engine: str, reading: Reading) -> None:
+def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
     """Rows of what an engine has read differently, and checks of the masses and moments of inertia."""
-    record = RECORDS[engine]
     label, lacking, mended = record.label, list(reading["lacking"]), reading["mended"]
     share = result.readers[label] = Share(reading["way"], reading["unwritten"])
     if reading["copied"]:
@@ -51,7 +50,7 @@ def compare_numbers(result: EnginesResult, robot: Robot, engine: str, reading: R
     listed = [number for number in mended if number not in lacking]
     listed = [number for number in listed if not set(FOLLOWS.get(number, ())) & mended.keys()]
     entries = [entry for number in listed for entry in differing(robot, record, reading, number)]
-    causes = causes_of(engine, file_of(robot), reading, entries)
+    causes = causes_of(record, file_of(robot), reading, entries)
     for number in listed:
         of_number = {entry: causes.get(entry) for entry in entries if entry.number == number}
         add_differing(result, robot, record, reading, of_number)

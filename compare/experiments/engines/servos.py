@@ -9,7 +9,7 @@ import tmt
 
 from ...engines import GRID, LABELS, RECORDS, Array, Dynamics, Engine, Method, Setting
 from ...engines.outside import Outside
-from ...engines.outside.file import EngineError
+from ...engines.outside.file import EngineError, TooLong
 from ...judge.run import diverged_at
 from ...judge.scale import FACTOR
 from ...robots.case import Case
@@ -48,6 +48,8 @@ def follow_step(result: EnginesResult, setup: Setup, engine: Engine, reads_anoth
             row = add_response(result, setup, case, engine, method)
             if reads_another and isinstance(engine, Outside):
                 add_as_read(result, case, engine.as_read(case), method, row)
+        except TooLong:
+            raise
         except EngineError as error:
             result.find("left_out", what=f"{method.label}, servos", reason=str(error).rstrip("."))
             return

@@ -61,6 +61,7 @@ class MethodRow(Row):
     ended: str | None
     order: int | None
     measured_order: float | None = None
+    finer_left_out: bool = False  # since this run took too long
 
     @property
     def own_seconds(self) -> float:
@@ -82,8 +83,10 @@ class AnswerRow(Row):
     within_1e_6_cost: float | None = column("ms")
     within_1e_9: str | None
     within_1e_9_cost: float | None = column("ms")
-    floor: float | None = column("rad")
+    floor: float | None = column("rad")  # the smallest error
     floor_method: str | None
+    floor_reached: bool  # False: it falls with finer steps or tolerances
+    finer_left_out: bool  # of a method that has not reached its floor, since they take too long
 
 
 @dataclass(kw_only=True)

@@ -21,10 +21,9 @@ from ...judge.run import movement_unit, number_or_none
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ..setup import Setup
-from .limits import compared_limits, stable_answers
 from .records import FreeRow, JointRow, PairRow, StageRow, SubsetRow, UseRow
 from .scene import Scene, scene_of
-from .search import Answer, Locks, frontier, seconds_of, take_out
+from .search import Answer, Locks, compared_limits, frontier, seconds_of, stable_answers, take_out
 from .sub_blocks import check_blocks, differences, units_of
 
 TEXT = "reduction_of_file"  # the template

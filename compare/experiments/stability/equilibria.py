@@ -10,7 +10,7 @@ from tmt.methods import METHODS
 
 from ...core.check import About, Result
 from ...engines import LABELS, Engine, one_of_each_scheme
-from ...engines.mujoco.differences import NUDGE, left_to_itself, transition
+from ...engines.mujoco.calls import NUDGE, left_to_itself, transition
 from ...judge.run import diverged_at, step_in_words
 from ...judge.scale import EPS, FACTOR
 from ...robots.case import Case

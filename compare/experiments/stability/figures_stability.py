@@ -129,7 +129,7 @@ def draw_limits(
 
 
 def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
-    """Growth over step: a line for each integrator, marks of limits, the file's own step; a panel for each surroundings."""
+    """Growth over step, a panel for each surroundings: lines of integrators, limits by the derivative and in runs."""
     rows = result.tables["step_limits"]
     dt, integrator, posture = rows[0].file_dt, rows[0].file_integrator, rows[0].posture
     fig = Figure(figsize=(WIDTH, 3.8), layout="constrained")
@@ -138,15 +138,18 @@ def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
         for name, curve in curves.items():
             colour, dash, marker, width = GROWTH_LOOKS[name]
             ax.plot(*zip(*curve), color=colour, linestyle=dash, linewidth=width, label=name)
-            limits = [
-                row.longest for row in rows if (row.surroundings, row.integrator) == (surroundings, name)
-            ]
-            ax.plot(limits[0], 1.0, marker, color=colour, markersize=6, markeredgecolor="black", zorder=4)
+            row = next(row for row in rows if (row.surroundings, row.integrator) == (surroundings, name))
+            looks: dict[str, Any] = {"markersize": 6, "markeredgecolor": "black", "zorder": 4}
+            ax.plot(row.predicted, 1.0, marker, color="white", **looks)
+            if row.decided_by_runs:
+                ax.plot(row.longest, 1.0, marker, color=colour, **looks)
+                ax.axvline(row.longest, color=colour, linewidth=0.8, linestyle=dash)
         ax.axhline(1.0, color="black", linewidth=0.6)
         ax.axvline(dt, color="black", linewidth=0.8, linestyle=":")
         ax.set(xscale="log", xlabel="dt, s", ylim=(0.9, MOST_GROWTH), title=TITLES[surroundings])
     panels[0].set_ylabel("growth of a deviation in a step")
-    panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="limit")
+    panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="limit by the derivative")
+    panels[0].plot([], [], "o", color=GREY, markeredgecolor="black", label="limit in runs")
     fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
     values = {"posture": posture, "dt": dt, "integrator": integrator}
     return "stability_growth", fig, result.finding("figure_growth", OF, **values)

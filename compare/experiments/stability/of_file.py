@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from itertools import chain
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -9,7 +10,7 @@ from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.finding import Finding
 from ...engines.mujoco.reading import Reading
 from ...robots.file import names_of_keys
-from ...stability.answer import Asked, PlaceAnswer, StepLimitRow, answer, integrators_at_rest
+from ...stability.answer import Asked, PlaceAnswer, StepLimitRow, answers, integrators_at_rest
 from ...stability.control import MOST_PERIOD, controlled
 from ...stability.limits import LONGEST, SHORTEST
 from ...stability.motion import MotionRow, motion
@@ -24,7 +25,7 @@ OF = "of_file"  # the template
 RADII_WITHIN = 1e-4  # relative: of the growth in a step, MuJoCo's is by differences
 WHOLE = 1e-9  # of a step: a delay that is so near to whole steps is
 MOST_GROWTH = 10.0  # in a step: with more, differences leave the zone in which the forces are linear
-DEFAULT_STEP, DEFAULT = 0.002, "Euler"  # MuJoCo's step, s, and integrator where a file states none
+DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
 FAR, CREEPS = 0.05, 1e-4  # rad or m, rad/s or m/s: of a rest that is told, from its posture, and of a creep
 MODES = "growth of a step in closed form, TMT to MuJoCo"
 PUSHED = "stable after a push"
@@ -37,7 +38,7 @@ class AtStep(NamedTuple):
     asked: Asked
     is_requested: bool
     runs: Iterable[OwnRunRow]
-    answers: Iterable[PlaceAnswer]
+    answers: Iterable[list[PlaceAnswer]]
 
 
 class Work(NamedTuple):
@@ -64,13 +65,12 @@ def begin(setup: Setup, reading: Reading) -> Work:
         is_requested = question is not asked[0]
         others = question._replace(integrators=[question.integrator], drawn=False, in_runs=setup.alone)
         tasks = [
-            (posture, contacts, others if number else question)
+            (posture, others if number else question)
             for number, posture in enumerate(postures if setup.alone else postures[:1])
-            for contacts in ((True,) if is_requested else (True, False))
         ]
         runs = own_run.begin(setup, reading, question.dt, question.integrator)
-        answers = setup.map(partial(answer_of, reading=reading), tasks)
-        steps.append(AtStep(question, is_requested, runs, answers))
+        found = setup.map(partial(answers_of, reading=reading, air=not is_requested), tasks)
+        steps.append(AtStep(question, is_requested, runs, found))
     control = partial(control_row, reading=reading, request=request, asked=asked[-1])
     moving = partial(motion_row, reading=reading, asked=asked[-1])
     return Work(
@@ -81,9 +81,9 @@ def begin(setup: Setup, reading: Reading) -> Work:
     )
 
 
-def answer_of(task: tuple[Posture, bool, Asked], reading: Reading) -> PlaceAnswer:
-    posture, contacts, asked = task
-    return answer(posture, contacts, reading, asked)
+def answers_of(task: tuple[Posture, Asked], reading: Reading, air: bool) -> list[PlaceAnswer]:
+    posture, asked = task
+    return answers(posture, reading, asked, air)
 
 
 def control_row(posture: Posture, reading: Reading, request: Request, asked: Asked) -> ControlRow | None:
@@ -112,10 +112,16 @@ def motion_row(posture: Posture, reading: Reading, asked: Asked) -> MotionRow:
 
 
 def add(result: StabilityResult, work: Work) -> None:
-    """Rows, checks, the answer at the top, the curves, and what makes the step stable."""
+    """Rows, checks, the answer at the top, the curves, and what makes the step stable; motions first, if they are asked for."""
+    for moving in work.motions:
+        result.tables.setdefault("motion_stability", []).append(moving)
+        passed = 1 if moving.passed else None
+        where, quantity = moving.posture, "growth along its motion"
+        result.check(where, quantity, passed, 1, "runs", rule="equal", about=About.STEP)
+        result.top.append(result.finding("motion", OF, row=moving))
     for step in work.steps:
         runs = own_run.add(result, list(step.runs), step.is_requested)
-        places = list(step.answers)
+        places = list(chain.from_iterable(step.answers))
         rows = [row for place in places for row in place.rows]
         add_checks(result, rows, AT_REQUESTED_STEP if step.is_requested else AT_OWN_STEP)
         add_answer(result, places, step, runs)
@@ -126,12 +132,6 @@ def add(result: StabilityResult, work: Work) -> None:
         result.top.append(result.finding("left_out", OF, most=MOST_POSTURES, names=work.left_out))
     for row in work.control:
         add_control(result, row)
-    for moving in work.motions:
-        result.tables.setdefault("motion_stability", []).append(moving)
-        passed = 1 if moving.passed else None
-        where, quantity = moving.posture, "growth along its motion"
-        result.check(where, quantity, passed, 1, "runs", rule="equal", about=About.STEP)
-        result.top.append(result.finding("motion", OF, row=moving))
 
 
 def in_use(rows: Sequence[StepLimitRow], integrator: str) -> list[StepLimitRow]:
@@ -195,16 +195,13 @@ def add_answer(
         requested=step.is_requested, dt=asked.dt, integrator=asked.integrator, up_to=LONGEST, calm=CALM,
     )  # fmt: skip
     if is_calm:
-        tell("own_run", run=runs[0], others=len(runs) - 1)
-    if step.is_requested:
-        add_facts(tell, worst, None)
-    else:
-        known = [place for place in places if place.rows]
-        for place in known if len(rows) > 1 else ():
+        creeps = any((row.creep or 0.0) > CREEPS for row in as_it_stands)
+        tell("own_run", run=runs[0], others=len(runs) - 1, creeps=creeps)
+    add_facts(tell, worst)
+    if not step.is_requested:
+        for place in places if len(rows) > 1 else ():
             tell("limits_at", rows=place.rows, up_to=LONGEST)
-        is_default = (asked.dt, asked.integrator) == (DEFAULT_STEP, DEFAULT)
-        add_facts(tell, worst, None if is_default else next(iter(as_it_stands), None))
-        for first in (place.rows[0] for place in known):
+        for first in (place.rows[0] for place in places):
             if first.surroundings != "air" and is_told(first):
                 tell("rest", row=first, far=FAR, creeps=CREEPS)
     if worst and worst.stable_at_file_dt is False:
@@ -223,8 +220,8 @@ def others_at(row: StepLimitRow, rows: Iterable[StepLimitRow]) -> list[StepLimit
     return list({other.integrator: other for other in here}.values())
 
 
-def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: StepLimitRow | None) -> None:
-    """What else matters of the step in use, and of MuJoCo's default step. default: that of Euler, where it is another."""
+def add_facts(tell: Callable[..., None], row: StepLimitRow | None) -> None:
+    """What else matters of the step in use."""
     if row is None:
         return
     if row.decided_by_runs and row.limit in ("finite", "none"):
@@ -233,10 +230,6 @@ def add_facts(tell: Callable[..., None], row: StepLimitRow | None, default: Step
         tell("push", row=row)
     if row.needs_friction(row.file_dt):
         tell("friction", row=row)
-    if default and default.integrator == DEFAULT and default.is_known:
-        held = default.needs_friction(DEFAULT_STEP)
-        if held or default.longest < DEFAULT_STEP:
-            tell("default", dt=DEFAULT_STEP, integrator=DEFAULT, held=held)
 
 
 def is_told(row: StepLimitRow) -> bool:
@@ -260,8 +253,10 @@ def add_control(result: StabilityResult, row: ControlRow | None) -> None:
 
 
 def headline(result: StabilityResult) -> Finding | None:
-    """Whether the file's step is stable."""
+    """Whether the file's step is stable: along the worst of the motions that are asked for, else at rest."""
     table = result.tables["step_limits"]
     own = in_use(table, table[0].file_integrator)
-    values = {"up_to": LONGEST, "dt": table[0].file_dt}
-    return result.finding("headline", OF, row=own[0], **values) if own else None
+    motions: list[MotionRow] = result.tables.get("motion_stability", [])
+    motion = max(motions, key=lambda row: (not row.passed, row.rate), default=None)
+    values = {"row": own[0] if own else None, "up_to": LONGEST, "dt": table[0].file_dt, "motion": motion}
+    return result.finding("headline", OF, **values) if own or motion else None

@@ -9,12 +9,12 @@ from ...engines.mujoco.names import on
 from ...engines.mujoco.step import WholeRun
 from ...judge.run import number_or_none
 from ...robots.file import names_of_keys
-from ...stability.place import MOST_POSTURES, Posture, standing_at
+from ...stability.place import MOST_POSTURES, Posture
 from ...stability.start import CALM, StartRuns, is_calm
 from ..setup import Setup
 from .tables import OwnRunRow
 
-FINER = 16  # the step over the finer one
+FINER, MOST_FINER = 16, 60_000  # the step over the finer one, at most; steps of that run
 FASTER = 10.0  # fold, than at the finer step: what moves on by the step alone
 AT_OWN, AT_REQUESTED = "stable in its own run", "stable in its run"
 ORDER = ("worse", "fails", "alike", "calm")  # of what is told first
@@ -33,9 +33,10 @@ def own_run(key: str, dt: float, integrator: str, reading: Reading) -> OwnRunRow
     finer step it does not; alike, it does so there too; fails, it diverges there too.
     """
     name = names_of_keys(reading).get(key, "qpos0")
-    starts = StartRuns(standing_at(reading, Posture(name, key)), integrator)
-    finer_dt, outcome, finer = dt / FINER, "calm", None
+    starts = StartRuns(reading, Posture(name, key), integrator)
+    outcome, finer = "calm", None
     own, lasts = starts.until_rest(dt)
+    finer_dt = dt / min(FINER, max(2, MOST_FINER // round(lasts / dt)))
     moved = starts.moved(own, lasts) if is_calm(own) else None
     if moved is None or moved.is_elsewhere:
         finer = starts.run(finer_dt, lasts)

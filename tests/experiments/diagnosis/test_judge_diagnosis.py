@@ -11,7 +11,6 @@ from compare.judge.scale import EPS, FACTOR
 from compare.run import examine as experiment
 
 HEAVY = XML.replace('mass="1.5"', 'mass="1.51"')
-DAMPED = XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.1"/>')
 
 
 def failed(result):
@@ -42,12 +41,6 @@ def test_a_cause_is_a_row_and_a_note_of_the_check_that_fails():
     assert "mass of forearm" in check.note and "1.51 kg" in check.note
     assert list(map(say, result.notes)) == [check.note]
     assert not list(diagnosis.figures(result, None))  # the cause says it
-
-
-def test_damping_is_seen_in_accelerations_alone():
-    result = diagnosis.rows(setup_of(DAMPED))
-    (check,) = failed(result)
-    assert [row.place for row in result.rows] == ["damping of beta"] and "accelerations" in check.quantity
 
 
 @pytest.mark.parametrize("names, text, made, found", [

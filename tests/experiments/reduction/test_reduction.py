@@ -11,7 +11,7 @@ import tmt
 from compare.core.check import Result
 from compare.engines.mujoco import Mujoco
 from compare.experiments import reduction
-from compare.experiments.reduction import exact_motion, sub_blocks
+from compare.experiments.reduction import sub_blocks
 from compare.experiments.reduction.records import SubsetRow
 from compare.judge.scale import EPS
 from compare.robots.arm import ARM
@@ -115,14 +115,14 @@ def test_sub_blocks_agree_within_64_eps(apart, passes):
     (1.76e-10, 1.1e-11, [True]), (1.0, 9e-12, []), (1e-3, np.nan, [False]),  # hidden by rounding; a run that ends
 ])  # fmt: skip
 def test_errors_fall_at_the_order_of_the_method(coarse, fine, passed):
-    assert list(verdicts(exact_motion.check_falling, "swing", coarse, fine).values()) == passed
+    assert list(verdicts(reduction.check_falling, "swing", coarse, fine).values()) == passed
 
 
 def swings(model, **scene) -> Result:
     result = Result("reduction")
     cases = [ARM.case("mine", locked=("alpha", "beta"), **scene)] if scene else ARM.cases
-    for case in filter(exact_motion.is_pendulum, cases):
-        exact_motion.compare_swing(result, setup_of(model), case)
+    for case in filter(reduction.is_pendulum, cases):
+        reduction.compare_swing(result, setup_of(model), case)
     return result
 
 

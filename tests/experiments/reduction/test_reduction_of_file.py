@@ -21,10 +21,9 @@ from compare.engines.mujoco.smaller import Smaller, finished
 from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
 from compare.experiments.reduction import of_file, search
-from compare.experiments.reduction.limits import compared_limits, stable_answers
 from compare.experiments.reduction.records import FrontierRow
 from compare.experiments.reduction.scene import scene_of
-from compare.experiments.reduction.search import answer_within, take_out
+from compare.experiments.reduction.search import answer_within, compared_limits, stable_answers, take_out
 from compare.experiments.setup import Request
 from compare.robots.scene_file import SceneError, read_controls, read_scenes
 from compare.run.reference import compared_with

@@ -3,11 +3,13 @@
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pytest
 from edited import setup_of_file
 from servo_models import INERTIA
 
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
+from compare.core.text import say
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
@@ -86,19 +88,33 @@ def answers_of(result):
     return [finding for finding in result.top if finding.kind == "answer"]
 
 
-@pytest.mark.parametrize("more, default, told", [
-    ({"observed_dt": 0.09, "failing_dt": 0.12, "predicted_dt": 0.3}, None, ["by_derivative"]),
-    ({"largest_push": 0.01, "finer_push": True}, None, ["push"]),
-    ({"largest_push": 0.1, "finer_push": True}, None, []), ({"smooth_dt": 0.09}, None, ["friction"]),
-    ({"smooth_dt": 0.09, "file_dt": 0.08}, None, []), ({}, {"predicted_dt": 1e-3}, [False]), ({}, {"predicted_dt": 3e-3}, []),
-    ({}, {"predicted_dt": 3e-3, "smooth_dt": 1e-3}, [True]), ({}, {"predicted_dt": 1e-3, "integrator": "RK4"}, []),
+@pytest.mark.parametrize("more, told", [
+    ({"observed_dt": 0.09, "failing_dt": 0.12, "predicted_dt": 0.3}, ["by_derivative"]),
+    ({"largest_push": 0.01, "finer_push": True}, ["push"]), ({"largest_push": 0.1, "finer_push": True}, []),
+    ({"smooth_dt": 0.09}, ["friction"]), ({"smooth_dt": 0.09, "file_dt": 0.08}, []), ({}, []),
 ])  # fmt: skip
-def test_a_fact_is_told_where_it_matters(more, default, told):
-    """Of MuJoCo's default step: where it is not stable, or by dry friction alone."""
+def test_a_fact_is_told_where_it_matters(more, told):
     kinds = []
-    row = default and step_row(**default)
-    of_file.add_facts(lambda kind, **values: kinds.append(values.get("held", kind)), step_row(**more), row)
+    of_file.add_facts(lambda kind, **values: kinds.append(kind), step_row(**more))
     assert kinds == told
+
+
+def test_a_figure_marks_the_limit_of_runs_beside_that_of_the_derivative(result):
+    """The last word and the headline are that of runs, where they are others."""
+    rows = [step_row(), step_row(integrator="RK4", observed_dt=0.04, failing_dt=0.042)]
+    result.tables["step_limits"] = rows
+    result.growth = {"contact": {row.integrator: [(0.01, 0.9), (0.2, 1.2)] for row in rows}}
+    (ax,) = figures_stability.draw_growth(result)[1].axes
+    marks = [
+        (line.get_xdata()[0], line.get_color() == "white") for line in ax.lines if len(line.get_xdata()) == 1
+    ]
+    assert marks == [(0.1, True), (0.1, True), (pytest.approx(0.041, rel=1e-3), False)]
+
+
+@pytest.mark.parametrize("more, last", [({}, "100 ms"), ({"start_dt": 0.08}, "80 ms in runs from p itself")])
+def test_a_headline_has_the_limit_with_the_last_word_alone(result, more, last):
+    result.tables["step_limits"] = [step_row(**more)]
+    assert say(stability.headline(result)) == f"stable at 100 ms (limit: {last})"
 
 
 def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
@@ -138,3 +154,11 @@ def test_a_motion_is_judged_by_what_its_step_adds():
     fails = found_of(dt=0.025, at_speed=True)
     assert [row.passed for row in fails.tables["motion_stability"]] == [False, False]
     assert sum(check.failed and check.quantity == "growth along its motion" for check in fails.checks) == 2
+    worst = max(fails.tables["motion_stability"], key=lambda row: row.rate)
+    headline = stability.headline(fails)
+    assert headline.values["motion"] is worst and say(headline).startswith(
+        "not stable at 25 ms in its motion from "
+    )
+    assert worst.factor == pytest.approx(
+        np.exp(worst.rate)
+    ) and f"{worst.factor:.3g} times per second" in say(headline)

@@ -5,17 +5,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from trajectory_curves import CASES, DAMPED, FREE, run_of
+from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
 from compare.core.check import Result
 from compare.engines.mujoco import parse
 from compare.experiments.followed import Deviation
 from compare.experiments.trajectory import errors, runs
-from compare.experiments.trajectory.runs import TrajectoryResult
+from compare.experiments.trajectory.runs import Path, TrajectoryResult
 from compare.judge.run import widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
+from compare.truth.reference import reference
 
 LIFT_AND_HEAD = Coordinates(("lift", "head"), ("slide", "ball"))  # four movements, and four speeds
 NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
@@ -99,6 +100,21 @@ def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, wi
     result = TrajectoryResult("trajectory")
     runs.check_divergence(result, replace(run_of(case, ended=(ours, theirs), steps=100), band=width))
     assert [check.passed for check in result.checks] == found
+
+
+def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
+    q = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
+    others = [run_of(HELD, 9.0, 9.0, scheme="implicit"), run_of(HELD, 9.0, 9.0, steps=128)]
+    free, held = run_of(FREE), run_of(HELD, 0.25, np.nan)
+    free = replace(free, paths={"tmt": Path(q, q), "mujoco": Path(q + 100.0, q)})
+    result = TrajectoryResult("trajectory", runs=[*others, free, held])
+    errors.find_errors(result, ARM, {FREE.name: reference(FREE)})
+    assert list(result.errors) == [HELD.name, FREE.name] and result.errors[HELD.name] == (0.25, None)
+    assert result.answer.values["steps"] == 64
+    differences = {scene["scene"]: scene["difference"] for scene in result.notes[0].values["scenes"]}
+    assert differences[FREE.name] == pytest.approx(100.0) and np.isnan(differences[HELD.name])
+    ours, theirs = result.errors[FREE.name]
+    assert ours == pytest.approx(0.27, rel=0.03) and theirs > 90.0
 
 
 @pytest.mark.parametrize("engine, label", [("tmt", "TMT"), ("mujoco", "MuJoCo")])

@@ -116,17 +116,6 @@ def test_what_is_kept_of_a_run_is_whose_it_says():
     assert {row.diverged_at for row in result.rows} == {ended}
 
 
-def test_no_run_has_more_steps_than_8192_and_than_its_jacobians_allow_unless_the_scene_itself_has():
-    """Of 40 hinges a step has 6400 entries."""
-    case = setup_of_file(chain(40)).robot.case("c", duration=1.0, dt=1 / 512)
-    coarse, fine = FREE, FREE.changed(dt=5 / 8193)
-    assert runs.step_counts(coarse, (1, 16, 128)) == [64, 1024, 8192]
-    assert runs.step_counts(fine, (1, 2)) == [8193]
-    assert runs.steps_afforded(40) == 1_400_000 // 6400 and runs.step_counts(case, (1, 2)) == [512]
-    counts = [runs.recorded(FREE.changed(duration=n / 64, dt=1 / 64)) for n in (5, 65, 130, 512)]
-    assert counts == [5, 65, 65, 64]
-
-
 LIGHT = """<mujoco><worldbody><body><joint name="arm" axis="0 1 0" damping="0.1"/><geom size="0.1" pos="0.3 0 0"/>
 <body pos="0.3 0 0"><joint name="light" axis="0 1 0" damping="1"/>
 <inertial pos="0 0 0" mass="0.001" diaginertia="1e-5 1e-5 1e-5"/></body></body></worldbody></mujoco>"""

@@ -53,7 +53,7 @@ EDITS = (
     ("agreement.tables", "columns_exchanged", "same.any(axis=1).all()", "same.any()", "one column tells of all"),
     ("agreement.why", "is_single", "(finite % 1.0 != 0.0).any()", "True", "whole numbers have single precision"),
     ("agreement.why", "some_states", "-worst[finite]", "worst[finite]", "a cause is sought where all is right"),
-    ("agreement.accelerations", "Affine.inputs", "off.max() <= _1", "True", "any mass matrix is right"),
+    ("agreement.why", "Affine.inputs", "off.max() <= _1", "True", "any mass matrix is right"),
     ("experiments.diagnosis", "check", "result.notes.append(condition.finding)", "None", "what fails is not noted"),
     ("own.functions", "in_shape", "given == expected", "array.size == np.prod(shape)", "another order is taken"),
     ("own.equations", "OwnEquations.note", "hash(row.tobytes())", "object()", "a state counts each time it is asked"),
