@@ -5,6 +5,7 @@ for a stiff robot, the reference is a run in doubles of order 8. Halving its ste
 """
 
 from functools import lru_cache
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,10 @@ RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
 DOUBLES = "dopri8"  # the method of a run in doubles
 MOST_DOUBLINGS = 5  # of the number of its steps
+OF_ROUNDING, MOST_OF_ROUNDING = (
+    "rk4",
+    2**14,
+)  # the method whose run shows the growth of rounding, and its steps
 DIVERGES = 1.05  # growth in a step that overflows in the thousands of steps of a run
 
 
@@ -111,11 +116,13 @@ def in_doubles(case: Case) -> Reference:
 
 def has_no_reference(robot: Robot) -> Finding | None:
     """Why a file's robot has no reference: its fastest mode diverges with the finest steps; or None."""
-    stepping = METHODS[DOUBLES]
-    assert is_runge_kutta(stepping)
-    for case in robot.cases_of_torque if robot.is_read else ():
-        dt = case.duration / (first_steps(case) << MOST_DOUBLINGS)
+    cases = robot.cases_of_torque if robot.is_read else ()
+    for case, name in product(cases, (DOUBLES, OF_ROUNDING)):
+        stepping, first = METHODS[name], first_steps(case)
+        assert is_runge_kutta(stepping)
+        steps = first << MOST_DOUBLINGS if name == DOUBLES else max(MOST_OF_ROUNDING, 16 * first)
         decay, swing = rates_at(case.tree, case.q)
+        dt = case.duration / steps
         growth = np.abs(growth_of(stepping, np.array([-decay, 1j * swing]) * dt)).max()
         if not growth <= DIVERGES:
             return Finding("speed", "no_reference", {"noun": robot.noun, "rate": max(decay, swing), "dt": dt})

@@ -1,13 +1,17 @@
 """When a run has left or diverged, robots too stiff for their step, the order of a method: just inside and just outside."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from judged import BOTH, INSIDE, OUTSIDE, verdicts
+from models import chain
 from servo_models import spring
 from trees import one_body
 
 import tmt
 from compare.core.check import Result
+from compare.engines.mujoco import read
 from compare.judge.order import ORDER_MARGIN, check_order
 from compare.judge.run import (
     check_movement,
@@ -19,6 +23,8 @@ from compare.judge.run import (
 from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
 from compare.robots.arm import ARM
+from compare.robots.coordinates import rates_at
+from compare.robots.file import robot_of
 from compare.truth.reference import has_no_reference
 
 CASES = {case.name: case for case in ARM.cases}
@@ -101,6 +107,15 @@ def test_a_rate_that_leaves_no_digits_after_two_steps(share, passes):
 def test_a_reference_in_doubles_is_not_asked_of_a_rate_with_which_it_diverges():
     assert has_no_reference(spring(1e6)) is None and has_no_reference(spring(9e12)) is not None
     assert leaves_no_digits(ARM) is None and has_no_reference(ARM) is None
+
+
+@pytest.mark.parametrize("rate, has_one", [(4e4, True), (1e5, False)])
+def test_damping_that_rk4_does_not_bear_with_16384_steps_leaves_no_reference(rate, has_one):
+    """Of 14 hinges, whose runs have 1024 steps; 2.785 x 16384 is 4.6e4."""
+    tree = read(chain(14)).tree
+    ease = rates_at(replace(tree, damping=(1.0,) * 14), np.zeros(14))[0]
+    damped = chain(14).replace("<joint ", f'<joint damping="{rate / ease!r}" ')
+    assert (has_no_reference(robot_of(read(damped), "chain.xml")) is None) is has_one
 
 
 def checked(*order):
