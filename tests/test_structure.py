@@ -24,6 +24,11 @@ LIBRARIES = {
 SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup"))
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
+# parameters and fields that have a class of this project, or one of its engines' or libraries'
+OURS = {
+    "case", "drawn", "engine", "figure", "model", "one", "reading", "reference", "report", "result", "robot",
+    "section", "setup", "tree",
+}  # fmt: skip
 
 
 def dotted(path) -> str:
@@ -127,3 +132,22 @@ def test_no_module_of_an_experiment_hides_one_of_its_functions():
     """Importing a submodule sets the package's attribute of that name."""
     functions = {field.name for field in fields(Functions)}
     assert not {path for path in FILES if path.stem in functions and path.parent.parent.name == "experiments"}
+
+
+def annotations(path):
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.arg) and node.annotation:
+            yield node.arg, node.annotation
+        elif isinstance(node, ast.AnnAssign):
+            yield ast.unparse(node.target), node.annotation
+
+
+def test_object_is_the_type_of_nothing_of_the_project():
+    """An import is never avoided by `object` where a class is meant; of a user's values any type is possible."""
+    untyped = set()
+    for path in FILES:
+        for name, annotation in annotations(path):
+            parts = {part.id for part in ast.walk(annotation) if isinstance(part, ast.Name)}
+            if "object" in parts and name in OURS:
+                untyped.add(f"{dotted(path)}: {name}")
+    assert not untyped

@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 from edited import MOON, XML, setup_of_file
 from models import chain, random_tree
+from PIL import Image
 from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
 
 import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
+from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import figures_runs, motion, runs
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import diverged_at
@@ -21,6 +23,7 @@ from compare.robots.stick import as_seen, stick_figure
 
 LEVELS = {f"{level}, TMT to MuJoCo" for level in ("one step", "open loop")}
 CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
+BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
 
 
 def side(case) -> runs.Twin:
@@ -186,3 +189,19 @@ def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_a
     assert links == [(0, 1), (1, 2), (2, 3)] and points.shape == (1, 4, 3)
     right, _, up = as_seen(np.eye(3))
     assert up == pytest.approx([0.0, np.cos(np.radians(20.0))]) and right[0] > 0.9
+
+
+def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(drawn, tmp_path):
+    left = np.array([[-1.0, 1.0], [-1.0, 1.5], [-1.0, 2.0]])
+    right = left[:, ::-1]
+    points = {"tmt": np.stack([left] * 3), "mujoco": np.stack([right, left, np.nan * right])}
+    scene = drawn._replace(t=drawn.t[:3], apart=drawn.apart[:3], points=points)
+    gif.Animation([scene], "TMT").savefig(tmp_path / "motion.gif")
+    found = []
+    with Image.open(tmp_path / "motion.gif") as image:
+        for k in range(image.n_frames):
+            image.seek(k)
+            pixels = np.asarray(image.convert("RGB"), int)[gif.TOP : -gif.BOTTOM]  # below the names
+            columns = [np.nonzero(np.abs(pixels - colour).max(axis=2) < 8)[1] for colour in (BLUE, ORANGE)]
+            found.append([of.mean() // (gif.PIXELS[0] / 2) if len(of) > 100 else None for of in columns])
+    assert found == [[0, 1], [0, 0], [0, None]]  # in the left half, in the right one, nowhere
