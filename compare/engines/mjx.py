@@ -142,5 +142,5 @@ def functions() -> dict[str, Callable[..., Any]]:
         "values": compiled(values),
         "derivatives": compiled(jax.jacfwd(acceleration, argnums=(2, 3, 4))),
         "path": compiled(path, static_argnames="records"),
-        "worlds": jax.jit(worlds),
+        "worlds": compiled(worlds),
     }
