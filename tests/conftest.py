@@ -28,8 +28,8 @@ settings.register_profile("project", database=None, derandomize=True, deadline=N
 settings.load_profile("project")
 
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
-    "tests": 70, "diagnosis": 19, "engines": 18, "experiments": 58, "export": 8, "fleet": 16, "judge": 2, "process": 8,
-    "report": 12, "stability": 15, "tmt": 62, "truth": 5,
+    "tests": 70, "diagnosis": 22, "engines": 18, "experiments": 58, "export": 8, "fleet": 12, "judge": 2, "process": 8,
+    "report": 12, "stability": 26, "tmt": 52, "truth": 5,
 }  # fmt: skip
 LONGEST = 10  # tests that are listed
 

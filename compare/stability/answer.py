@@ -10,7 +10,7 @@ from ..core.rows import Row, column
 from ..engines.mujoco.forces import rows_at
 from ..engines.mujoco.names import INTEGRATORS, contact_name
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.variants import has_free_base
+from ..engines.mujoco.variants import stands
 from . import runs
 from .closed_form import radius_apart
 from .cures import Cure, cures
@@ -167,7 +167,7 @@ def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow
     at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
     joint, contact = limiting(place, found.rest, found.growth)
     row = StepLimitRow(
-        posture=place.posture.name, base="free" if has_free_base(place.reading.model) else "fixed",
+        posture=place.posture.name, base="free" if stands(place.reading.model) else "fixed",
         surroundings=place.surroundings, integrator=integrator, limit=found.kind,
         predicted_dt=found.dt, file_dt=dt, file_integrator=asked.integrator,
         limiting_joint=joint, limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,

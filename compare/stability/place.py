@@ -13,7 +13,14 @@ import tmt
 from ..engines.mujoco.names import element_name, on
 from ..engines.mujoco.reading import Reading
 from ..engines.mujoco.step import Step, distance, start_of
-from ..engines.mujoco.variants import add_armature, has_free_base, in_the_air, of_base, without_dry_friction
+from ..engines.mujoco.variants import (
+    add_armature,
+    has_free_base,
+    in_the_air,
+    loose_objects,
+    of_base,
+    without_dry_friction,
+)
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
 from .limits import is_saddle, tried
@@ -167,19 +174,13 @@ def touches(step: Step, state: np.ndarray) -> bool:
 
 
 def restless_objects(step: Step, state: np.ndarray) -> np.ndarray:
-    """Which speeds are those of loose objects that go on moving where the robot would rest, (nv,).
-
-    A loose object is a free body that carries no joint, beside something else that moves.
-    """
-    model = step.model
-    tree = np.array(model.dof_treeid)
-    is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
-    loose = is_free & (np.bincount(tree)[tree] == 6)
-    if loose.all() or not loose.any():
-        return np.zeros(model.nv, bool)
+    """Which speeds are those of loose objects that go on moving where the robot would rest, (nv,)."""
+    loose, trees = loose_objects(step.model), np.array(step.model.dof_treeid)
+    if not loose.any():
+        return loose
     rest = rest_near(step, state)
     moves = (np.abs(rest.accelerations) > NEAR_REST) | (np.abs(rest.speeds) > MOVING)
-    return loose & np.isin(tree, tree[moves])
+    return loose & np.isin(trees, trees[moves])
 
 
 def with_held(model: mujoco.MjModel, still: np.ndarray) -> mujoco.MjModel:

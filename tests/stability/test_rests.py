@@ -130,6 +130,7 @@ def test_a_loose_object_that_moves_on_is_named_and_hides_nothing():
     text = hinge(20.0, 5.0).replace("</worldbody>", ball)
     place = place_of(text)
     assert place.held_objects == "ball" and not place_of(hinge()).held_objects
+    assert limit_row(place, "Euler", Asked(2e-3, "Euler", ["Euler"]))[0].base == "fixed"  # it does not stand
     assert limit_of(text).dt == pytest.approx(limit_of(hinge(20.0, 5.0)).dt, rel=3e-3)
     tail = '<body><joint axis="0 1 0"/><geom size="0.1" pos="0.2 0 0"/></body></body></worldbody>'
     assert not place_of(text.replace("</body></worldbody>", tail)).held_objects  # a robot is none

@@ -23,7 +23,25 @@ def varied(model: mujoco.MjModel, **numbers: ArrayLike) -> mujoco.MjModel:
 
 
 def has_free_base(model: mujoco.MjModel) -> bool:
-    """Whether a base would fall: by a free joint, or a slide along gravity that nothing drives or stops."""
+    """Whether a base would fall."""
+    return bool(falling_joints(model).any())
+
+
+def stands(model: mujoco.MjModel) -> bool:
+    """Whether the base of a robot would fall, beside which loose objects do not count."""
+    return bool((falling_joints(model) & ~loose_objects(model)[model.jnt_dofadr]).any())
+
+
+def loose_objects(model: mujoco.MjModel) -> np.ndarray:
+    """Which speeds are those of free bodies that carry no joint, (nv,); none, if nothing else moves."""
+    trees = np.array(model.dof_treeid)
+    is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
+    loose = is_free & (np.bincount(trees)[trees] == 6)
+    return np.asarray(loose & (not loose.all()))
+
+
+def falling_joints(model: mujoco.MjModel) -> np.ndarray:
+    """Which joints are free, or a slide of a base along gravity that nothing drives or stops, (njnt,)."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     along = np.abs(data.xaxis @ model.opt.gravity) > 0.1 * np.linalg.norm(model.opt.gravity)
@@ -31,7 +49,7 @@ def has_free_base(model: mujoco.MjModel) -> bool:
     slides = (model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE) & along & of_world
     slides &= (model.jnt_stiffness == 0.0) & (model.jnt_limited == 0)
     slides[model.actuator_trnid[model.actuator_trntype == mujoco.mjtTrn.mjTRN_JOINT, 0]] = False
-    return bool((slides | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)).any())
+    return np.asarray(slides | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE))
 
 
 def of_base(model: mujoco.MjModel) -> np.ndarray:
