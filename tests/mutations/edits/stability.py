@@ -31,7 +31,7 @@ EDITS = (
     ("of_file", "begin", "Asked(*step, [step[1]])", "asked[0]", "a requested step is the file's"),
     ("stability.limits", "GIVES_WAY", "0.3", "30.0", "a rest far away is the same"),
     ("stability.place", "Place.has_fallen", "of_base(self.model)", "True", "an arm that sinks has fallen"),
-    ("stability.place", "restless_objects", "np.bincount(tree)[tree] == 6", "True", "a walker is a loose object"),
+    ("mujoco.variants", "loose_objects", "np.bincount(trees)[trees] == 6", "True", "a walker is a loose object"),
     ("stability.cures", "least_factor", "changed and _1", "changed", "no cure is run"),
     ("of_file", "control_row", "ceil(_1 / asked.dt - WHOLE)", "round(_1 / asked.dt)", "a delay is rounded"),
     ("of_file", "add_control", "int(row.grows_in_run != row.is_stable)", "1", "a program runs as predicted"),
