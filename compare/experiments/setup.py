@@ -79,7 +79,7 @@ class Setup:
     progress: Callable[[str], Any] = nothing  # reports the progress of long work
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
-    request: Request = NO_REQUEST  # of stability
+    request: Request = NO_REQUEST  # of stability and reduction
     command: str = ""  # the words of the run
     size: str = "full"
 

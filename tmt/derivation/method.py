@@ -1,4 +1,4 @@
-"""The TMT method, as the assignment states it, for any tree of hinges and over any scalar.
+"""The TMT method, as the assignment states it, for any tree of joints and over any scalar.
 
 The Newton and Euler equations of each body b,
 
@@ -244,7 +244,7 @@ def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scala
 def acceleration(
     tree: AnyTree, q: Scalars, qd: Scalars, tau: Scalars, terms: Terms = mass_matrix_and_bias
 ) -> Values:
-    """qdd (nv, rad/s2) from Mbar qdd = Qbar = tau - D qd - k (q - rest) - h."""
+    """qdd (nv, rad/s2) from Mbar qdd = Qbar, see the head of this file."""
     M, h = terms(tree, q, qd)
     return solve(M, reduced_force(tree, h, q, qd, tau))
 

@@ -50,7 +50,7 @@ class Linearized(Dynamics):
         super().__init__(form.terms)
         self.form = form
         self.last: Change  # of the state that was met last
-        # dual numbers of traced scalars meet the same states once for each direction
+        # dual numbers of traced scalars meet the same states once for each direction; i: of a scalar on the tape
         self.changes: dict[tuple[int, ...], Change] = {}
 
     def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
