@@ -103,7 +103,8 @@ def test_what_is_taken_out_changes_no_number_of_the_motion(compiler, option):
     for lighter in (source.model, source.without({}, bare=True)):
         for name in (*FIELDS, "dof_M0", "jnt_axis"):
             assert np.array_equal(getattr(whole, name), getattr(lighter, name)), name
-        assert lighter.ntexdata == 0 < whole.ntexdata
+        if mujoco.mj_version() >= 4_000_000:  # before, a material asks for its texture
+            assert lighter.ntexdata == 0 < whole.ntexdata
 
 
 def test_the_rotor_of_a_joint_stays_where_a_tendon_of_its_name_goes():

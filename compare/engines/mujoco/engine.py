@@ -15,13 +15,12 @@ from ...robots.case import Case
 from .. import Engine, Method
 from .dynamics import Engaged, MujocoDynamics
 from .inventory import set_fields, switch_off
-from .names import INTEGRATORS, bit, set_control
+from .names import FROM_4, INTEGRATORS, bit, set_control
 from .source import Source
 
 # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
 SCHEMES = dict.fromkeys(("Euler", "implicitfast", "discrete"), "semi_implicit_euler")
 SCHEMES |= {"implicit": "implicit", "RK4": "rk4"}
-FROM_4 = int(mujoco.__version__.split(".")[0]) >= 4
 
 
 def methods_for(tree: Tree | None = None) -> dict[str, Method]:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ...robots.coordinates import FREE, Coordinates
 
 Integer = int | np.integer[Any]
+FROM_4 = mujoco.mj_version() >= 4_000_000
 # those that the installed version has; discrete came with 3.13
 NAMES = "Euler", "implicitfast", "discrete", "implicit", "RK4"
 MEMBERS = {name: getattr(mujoco.mjtIntegrator, f"mjINT_{name.upper()}", None) for name in NAMES}

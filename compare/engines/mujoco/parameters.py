@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 from ...core.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
-from .engine import FROM_4
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
 from .locked import FROM_GEOMS
-from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
+from .names import FROM_4, aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
 from .source import Source, is_urdf
 

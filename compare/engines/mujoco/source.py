@@ -22,7 +22,7 @@ import numpy as np
 from ...process.parts import is_pipe, named_by
 from . import locked
 from .locked import FROM_GEOMS, Positions, compiled, gives_inertia
-from .names import moving
+from .names import FROM_4, moving
 
 # by MuJoCo, of a mesh that is not there or in another format
 UNREAD = ("Error opening file", "no decoder found")
@@ -275,7 +275,12 @@ def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def delete_textures(spec: mujoco.MjSpec) -> int:
-    """Delete all textures, which are large in each copy of a model; how many there were."""
+    """Delete all textures, which are large in each copy of a model; how many there were.
+
+    Before MuJoCo 4 a material asks for the texture that it had: they stay.
+    """
+    if not FROM_4:
+        return 0
     for material in spec.materials:
         material.textures = [""] * len(material.textures)
     textures = list(spec.textures)
