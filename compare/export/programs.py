@@ -6,6 +6,7 @@ import runpy
 import shlex
 import shutil
 import subprocess
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -46,7 +47,7 @@ class WrongProgram(RuntimeError):
 
 
 @dataclass
-class Program:
+class Program(ABC):
     """The files of a folder, for a Tree; `values` runs a function of them."""
 
     folder: Path
@@ -58,12 +59,12 @@ class Program:
     chosen: Parameters | None = None  # which these are
     file = ""  # that is run, where there are others with the same expressions
 
-    def __post_init__(self) -> None:
+    def __post_init__(self) -> None:  # noqa: B027  # what a dataclass calls, where there is something to do
         """Compile or load the text."""
 
+    @abstractmethod
     def values(self, quantity: str, states: States) -> list[Array]:
         """The arrays of a quantity at states, (states, ...) each: one, or one for each of its parts."""
-        raise NotImplementedError
 
     def operations(self, quantity: str) -> int:
         """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
