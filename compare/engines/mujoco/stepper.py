@@ -1,0 +1,323 @@
+"""Steps of a model with everything that its file has: runs of them, one by one, and their derivatives."""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from mujoco.rollout import rollout
+from numpy.typing import ArrayLike
+
+from .names import INTEGRATORS, SETTLING, bit, control_of, number_of_actuators, output_of
+
+Array = np.ndarray
+Act = Callable[[int, mujoco.MjData], None]  # before a step: its number, and the data to read and change
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
+PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS  # the part that mujoco.rollout gives after each step
+PARTS = {
+    name.removeprefix("mjSTATE_").lower(): member
+    for name, member in mujoco.mjtState.__members__.items()
+    if int(member).bit_count() == 1 and int(member) & int(STATE)
+}
+INPUTS = ("ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat", "userdata")
+# of delays and of springs that yield
+REMEMBERED = sum(int(member) for name, member in PARTS.items() if name in ("history", "plastic"))
+BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
+SLEEP = int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0))
+INTEGRATING, MUSCLE = mujoco.mjtDyn.mjDYN_INTEGRATOR, mujoco.mjtDyn.mjDYN_MUSCLE
+
+# a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
+_log = mujoco.MjLogConfig.get()
+_log.logto_file = _log.logto_console = False
+_log.set()
+
+
+class Rolled(NamedTuple):
+    """A batch of runs, without their starts.
+
+    q, v: after each step, (runs, steps, nq) and (runs, steps, nv), rad or m, and per s; NaN from where a run
+    ends. ended: how many steps each run took before MuJoCo found a bad number, (runs,) integers; `steps`: all.
+    states: where each run is at last, (runs, n): the start of a roll that goes on.
+    """
+
+    q: Array
+    v: Array
+    ended: Array
+    states: Array
+
+
+class Stepper:
+    """A copy of a model with a step, an integrator and no automatic reset, for good.
+
+    A state is a vector of all on which a step depends (MuJoCo's mjSTATE_INTEGRATION): time, qpos, qvel, act,
+    what delays remember, the start of the solver, and inputs: ctrl, qfrc_applied, mocap_pos ... `places` has
+    the slice of each part by its name, so that `states[:, stepper.places["qvel"]] += push` pushes.
+    """
+
+    def __init__(self, model: mujoco.MjModel, dt: float, integrator: str) -> None:
+        """dt: s. integrator: a name of names.INTEGRATORS."""
+        self.model, self.dt, self.integrator = mujoco.MjModel.__copy__(model), dt, integrator
+        self.model.opt.timestep, self.model.opt.integrator = dt, INTEGRATORS[integrator]
+        self.model.opt.disableflags |= bit("AUTORESET")
+        self.model.opt.enableflags &= ~SLEEP  # a state does not say what sleeps
+        self.data = mujoco.MjData(self.model)
+        sizes = {name: mujoco.mj_stateSize(self.model, part) for name, part in PARTS.items()}
+        ends = np.cumsum(list(sizes.values())).tolist()
+        self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends)}
+        self.reset = self.state()  # as mj_resetData leaves it
+
+    # states
+
+    def start(
+        self, key: str = "", q: ArrayLike | None = None, v: ArrayLike | None = None,
+        controls: ArrayLike | None = None,
+    ) -> Array:  # fmt: skip
+        """The state of a keyframe, by its name, or of qpos0, with other positions, speeds or controls.
+
+        q: (nq,), at rest unless v, (nv,), is given; controls: (nu,). Controls are those of the keyframe if
+        any keyframe of the file states some. Else actuators whose force is affine in their length hold the
+        posture, within their ranges, as do integrators (intvelocity) in a keyframe without activations; all
+        others have control 0. Raises KeyError for a name that no keyframe has.
+        """
+        m, d = self.model, self.data
+        mujoco.mj_resetData(m, d)
+        if key:
+            mujoco.mj_resetDataKeyframe(m, d, m.key(key).id)
+        if q is not None:
+            d.qpos[:], d.qvel[:] = q, 0.0
+        if v is not None:
+            d.qvel[:] = v
+        has_controls = bool(key) and m.key_ctrl.any()
+        has_activations = bool(key) and m.key_act.any()
+        state = self.state()
+        mujoco.mj_fwdPosition(m, d)
+        lengths, ctrl, act = d.actuator_length.copy(), d.ctrl.copy(), d.act.copy()
+        for i in range(number_of_actuators(m)):
+            u = holding(m, i, lengths[output_of(m, i)])
+            if u is None:
+                continue
+            is_integrator = m.actuator_dyntype[i] == INTEGRATING
+            if not has_controls:
+                ctrl[control_of(m, i)[0]] = 0.0 if is_integrator else u
+            settles = m.actuator_dyntype[i] in SETTLING and (is_integrator or not has_controls)
+            if settles and not has_activations:
+                act[m.actuator_actadr[i]] = u
+        if controls is not None:
+            ctrl[:] = controls
+        state[self.places["ctrl"]], state[self.places["act"]] = ctrl, act
+        mujoco.mj_resetData(m, d)
+        return state
+
+    def state(self) -> Array:
+        """The state that the data have, (n,)."""
+        state = np.zeros(mujoco.mj_stateSize(self.model, STATE))
+        mujoco.mj_getState(self.model, self.data, state, STATE)
+        return state
+
+    def put(self, state: Array) -> mujoco.MjData:
+        """The data at a state, (n,), with no warning; what depends on the state is not computed."""
+        mujoco.mj_setState(self.model, self.data, state, STATE)
+        self.data.warning.number[:] = 0
+        return self.data
+
+    # runs
+
+    def watch(self, state: Array, steps: int, act: Act | None = None) -> Iterator[mujoco.MjData]:
+        """The data after each step of a run from a state, (n,), until MuJoCo finds a bad number.
+
+        act: called before each step with its number, from 0, and the data, whose controls it may set. Derived
+        fields (contacts, forces, accelerations) are of the state before the step.
+        """
+        self.put(state)
+        for step in range(steps):
+            if act is not None:
+                act(step, self.data)
+            mujoco.mj_step(self.model, self.data)
+            if self.data.warning.number[BAD].any():
+                return
+            yield self.data
+
+    def loop(self, state: Array, steps: int, controls: ArrayLike | None = None) -> Callable[[], Array]:
+        """A run as one call of MuJoCo's own loop, with all memory in place, to be measured.
+
+        It gives the physical part of the state, PHYSICS, after each step, (steps, size): time, qpos, qvel
+        first. After a warning MuJoCo steps no more and repeats the last. The data are where the run ends.
+        controls: (steps, nu); None: those of the state.
+        """
+        m = self.model
+        changed = [
+            name for name in INPUTS if np.any(state[self.places[name]] != self.reset[self.places[name]])
+        ]
+        names = ["ctrl", *(name for name in changed if name != "ctrl")]
+        rows = np.tile(np.concatenate([state[self.places[name]] for name in names]), (steps, 1))
+        if controls is not None:
+            rows[:, : m.nu] = controls
+        first = np.zeros(mujoco.mj_stateSize(m, PHYSICS))
+        mujoco.mj_extractState(m, state, STATE, first, PHYSICS)
+        warmstart = state[self.places["warmstart"]][None].copy()
+        # filled, so that the first run does not have to fetch the memory
+        states = np.full((1, steps, len(first)), np.nan)
+        sensors = np.zeros((1, steps, m.nsensordata))
+        spec = sum(int(PARTS[name]) for name in names)
+
+        def run() -> Array:
+            rollout(
+                [m], [self.data], first[None], rows[None], control_spec=spec, skip_checks=True, nstep=steps,
+                initial_warmstart=warmstart, state=states, sensordata=sensors,
+            )  # fmt: skip
+            return states[0]
+
+        return run
+
+    def roll(self, states: ArrayLike, steps: int, inputs: ArrayLike | None = None) -> Rolled:
+        """Runs from states, (runs, n) or (n,), bitwise as mj_step takes them.
+
+        inputs: controls at each step, (steps, nu) or (runs, steps, nu); None: those of the states, constant.
+        Rolling on from `Rolled.states` is the same as rolling on at once; a run that has ended ends at once.
+        """
+        m, starts = self.model, np.atleast_2d(np.asarray(states, float))
+        controls = None
+        if inputs is not None:
+            controls = np.broadcast_to(np.asarray(inputs, float), (len(starts), steps, m.nu))
+        paths = np.full((len(starts), steps, 1 + m.nq + m.nv), np.nan)
+        ends, ended = starts.copy(), np.full(len(starts), steps)
+        for k, start in enumerate(starts):
+            path = self.loop(start, steps, None if controls is None else controls[k])()
+            stopped = steps
+            if steps and self.data.warning.number.any():
+                last = int(np.argmax(path[:, 0] == path[-1, 0]))  # the step that warned
+                stopped = last if self.data.warning.number[BAD].any() else steps
+                if stopped == steps:  # of another kind, after which MuJoCo's own steps go on
+                    stopped = self.go_on(path, last + 1, None if controls is None else controls[k])
+            paths[k, :stopped] = path[:stopped, : paths.shape[2]]
+            ends[k], ended[k] = self.state(), stopped
+        return Rolled(paths[:, :, 1 : 1 + m.nq], paths[:, :, 1 + m.nq :], ended, ends)
+
+    def go_on(self, path: Array, first: int, controls: Array | None) -> int:
+        """Fill a path in from its step `first` on, from where the data are; how many steps it has then."""
+
+        def act(step: int, data: mujoco.MjData) -> None:
+            if controls is not None:
+                data.ctrl[:] = controls[first + step]
+
+        reached = first
+        for data in self.watch(self.state(), len(path) - first, act):
+            mujoco.mj_getState(self.model, data, path[reached], PHYSICS)
+            reached += 1
+        return reached
+
+    # derivatives
+
+    @property
+    def takes_transition(self) -> bool:
+        """Whether mjd_transitionFD is right: it refuses RK4 and delays, and leaves what has yielded."""
+        return self.integrator != "RK4" and not mujoco.mj_stateSize(self.model, REMEMBERED)
+
+    def derivative(
+        self, state: Array, eps: float, centred: bool = True, by: str = "ctrl"
+    ) -> tuple[Array, Array]:
+        """A and B of a step: its derivatives by the deviation of the state, (n, n), and by inputs, (n, k).
+
+        A deviation is a movement of the positions (nv,), the speeds (nv,) and the activations (na,). by: ctrl
+        (k = nu) or qfrc_applied (k = nv). eps: of the differences, rad, m, per s. They are those of MuJoCo's
+        mjd_transitionFD where it is right, else of mj_step; at an end of the range of an activation or of a
+        control they are one-sided.
+        """
+        m, n = self.model, 2 * self.model.nv + self.model.na
+        values = np.concatenate([np.zeros(2 * m.nv), state[self.places["act"]], state[self.places[by]]])
+        endless = np.tile([[-np.inf], [np.inf]], 2 * m.nv)
+        low, high = np.hstack([endless, ranges_of_activations(m), ranges_of(m, by)])
+        ahead, behind = eps * (values + eps <= high), eps * (values - eps >= low)
+        behind[ahead > 0.0] *= centred
+        both, first = np.zeros((n, len(values))), 0
+        if self.takes_transition and ahead[:n].all() and (behind[:n] > 0.0).all() == centred:
+            A, B = np.zeros((n, n)), np.zeros((n, m.nu))
+            mujoco.mjd_transitionFD(m, self.put(state), eps, centred, A, B, None, None)
+            if by == "ctrl":
+                return A, B
+            both[:, :n], first = A, n
+        for k in range(first, len(values)):
+            one, other = np.zeros((2, len(values)))
+            one[k], other[k] = ahead[k], -behind[k]
+            if ahead[k] + behind[k]:
+                moved = self.deviation(self.after(state, other, by), self.after(state, one, by))
+                both[:, k] = moved / (ahead[k] + behind[k])
+        return both[:, :n], both[:, n:]
+
+    def after(self, state: Array, by: Array, inputs: str = "ctrl") -> Array:
+        """The state, (n,), a step after a state that is moved.
+
+        by: a deviation, (2 nv + na,), which may be followed by a change of inputs, (nu,) or (nv,).
+        """
+        m, d = self.model, self.put(state)
+        movement, speed, activation, change = np.split(by, np.cumsum([m.nv, m.nv, m.na]))
+        mujoco.mj_integratePos(m, d.qpos, movement, 1.0)
+        d.qvel += speed
+        d.act += activation
+        if len(change):
+            getattr(d, inputs)[:] += change
+        mujoco.mj_step(m, d)
+        return self.state()
+
+    def deviation(self, one: Array, other: Array) -> Array:
+        """The deviation from one state to another: movement, speeds, activations, (2 nv + na,)."""
+        q, v, act = (self.places[name] for name in ("qpos", "qvel", "act"))
+        movement = distance(self.model, one[q], other[q])
+        return np.concatenate([movement, other[v] - one[v], other[act] - one[act]])
+
+
+def holding(m: mujoco.MjModel, actuator: int, length: float) -> float | None:
+    """The control, or activation, for which an actuator exerts nothing at a length, within its ranges.
+
+    None: its law is not affine, it does not depend on the length, or it has no control that would do.
+    """
+    gain, bias = m.actuator_gainprm[actuator], m.actuator_biasprm[actuator]
+    kind = m.actuator_dyntype[actuator]
+    is_affine = m.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
+    is_affine &= m.actuator_gaintype[actuator] in (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtGain.mjGAIN_AFFINE)
+    place, inputs = control_of(m, actuator)
+    if not is_affine or inputs != 1 or kind not in (mujoco.mjtDyn.mjDYN_NONE, *SETTLING) or not bias[1]:
+        return None
+    slope = gain[1] if m.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE else 0.0
+    factor = gain[0] + slope * length
+    if not factor:
+        return None
+    u = -(bias[0] + bias[1] * length) / factor
+    if m.actuator_ctrllimited[place] and kind != INTEGRATING and not m.opt.disableflags & bit("CLAMPCTRL"):
+        u = np.clip(u, *m.actuator_ctrlrange[place])
+    if m.actuator_actlimited[actuator] and kind in SETTLING:
+        u = np.clip(u, *m.actuator_actrange[actuator])
+    return float(u)
+
+
+def ranges_of_activations(m: mujoco.MjModel) -> Array:
+    """The least and the largest value of each activation, (2, na); infinite where it has no range."""
+    limits = np.tile([[-np.inf], [np.inf]], m.na)
+    for actuator in range(number_of_actuators(m)):
+        place = m.actuator_actadr[actuator] + m.actuator_actnum[actuator] - 1
+        if m.actuator_dyntype[actuator] == MUSCLE:
+            limits[:, place] = 0.0, 1.0
+        elif m.actuator_actlimited[actuator]:
+            limits[:, place] = m.actuator_actrange[actuator]
+    return limits
+
+
+def ranges_of(m: mujoco.MjModel, inputs: str) -> Array:
+    """The least and the largest value of each control, (2, nu), or of each force, (2, nv), infinite."""
+    if inputs != "ctrl":
+        return np.tile([[-np.inf], [np.inf]], m.nv)
+    limits = np.tile([[-np.inf], [np.inf]], m.nu)
+    if not m.opt.disableflags & bit("CLAMPCTRL"):
+        is_limited = m.actuator_ctrllimited.astype(bool)
+        limits[:, is_limited] = m.actuator_ctrlrange[is_limited].T
+    return limits
+
+
+def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
+    """The movement from positions to others, (..., nq) each: (..., nv) rad or m, of a ball in its own axes."""
+    pairs = np.broadcast_arrays(q0, q1)
+    starts, ends = (np.ascontiguousarray(q, float).reshape(-1, m.nq) for q in pairs)
+    moved = np.zeros((len(starts), m.nv))
+    for row, start, end in zip(moved, starts, ends):
+        mujoco.mj_differentiatePos(m, row, 1.0, start, end)
+    return moved.reshape(*pairs[0].shape[:-1], m.nv)
