@@ -2,12 +2,10 @@
 
 from dataclasses import replace
 
-import mpmath
 import numpy as np
 from models.made import random_turn
 
 from tmt import Tree
-from tmt.exact.tree import DIGITS
 
 UNIT = np.eye(3)
 
@@ -92,16 +90,3 @@ def random_state(rng, tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def random_states(rng, tree, count) -> list[np.ndarray]:
     """Rows of q (count, nq), qd and tau (count, nv)."""
     return [np.array(rows) for rows in zip(*(random_state(rng, tree) for _ in range(count)))]
-
-
-def exact_swing(t: np.ndarray, q: float, qd: float, hanging: float, frequency: float) -> np.ndarray:
-    """The angle of a pendulum, as compare.truth.pendulum.swing, with 50 digits of mpmath's elliptic functions."""
-    with mpmath.workdps(DIGITS):
-        q, qd, hanging, frequency = (mpmath.mpf(float(v)) for v in (q, qd, hanging, frequency))
-        turns = mpmath.floor((q - hanging) / (2 * mpmath.pi) + 0.5)
-        theta = q - hanging - 2 * mpmath.pi * turns
-        height, speed = mpmath.sin(theta / 2), qd / (2 * frequency)
-        m = height**2 + speed**2
-        begin = mpmath.ellipf(mpmath.atan2(height, speed), m)
-        sn = [mpmath.ellipfun("sn", u=frequency * mpmath.mpf(float(time)) + begin, m=m) for time in t]
-        return np.array([q - theta + 2 * mpmath.asin(mpmath.sqrt(m) * s) for s in sn], dtype=object)

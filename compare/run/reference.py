@@ -108,8 +108,14 @@ class Compared(NamedTuple):
             asked["controls"] = read_controls(asked["controls"], names)
             if options.scenes:
                 raise ModelError("--controls and --scenes both say what the robot does")
-        if asked["write"] and (why := not_writable(Path(asked["write"]), str(self.reading.source))):
-            raise ModelError(f"cannot write {asked['write']}: {why}")
+        if asked["write"] is not None:
+            from ..experiments.reduction.written import needed_of, refusal  # imports are slow
+
+            other = [Source(Path(options.reference))] if is_solution(options.reference or "") else []
+            path, needed = Path(asked["write"]).absolute(), needed_of(self.reading.source, *other)
+            if why := refusal(path, needed, Path(options.out)):
+                raise ModelError(f"cannot write {asked['write']}: {why}")
+            asked["write"] = str(path)
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)
 
@@ -162,15 +168,6 @@ def with_solution(source: Source, shown: str, asked: str, solution: str) -> Comp
     robot = robot_of_solution(reading, shown, stated, name)
     reference = reference._replace(source=name, renamed=renamed, otherwise=tuple(map(say, otherwise)))
     return Compared(reference, robot, engine(reading, stated), reading)
-
-
-def not_writable(path: Path, robot: str) -> str:
-    """Why a smaller file cannot be written there, "" if it can. robot: the path of its file."""
-    if path.is_dir():
-        return "it is a folder"
-    if not path.absolute().parent.is_dir():
-        return "there is no such folder"
-    return "it is the file of the robot itself" if path.resolve() == Path(robot).resolve() else ""
 
 
 def with_arm(source: Source, path: str | None, shown: str) -> Compared:

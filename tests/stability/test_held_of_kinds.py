@@ -4,15 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from many_digits import distance
 from models import PATHS, random_tree
 from servo_models import robot
-from trees import exact_swing
 
 import tmt
-from compare.robots.arm import ARM
 from compare.stability.held import Held, held, holding, moving, posture_names, slopes
-from compare.truth.pendulum import pendulum, swing
 from tmt import METHODS
 from tmt.methods import amplification
 
@@ -93,18 +89,3 @@ def test_the_limit_of_a_mode_that_only_decays_is_that_of_its_rate(robots):
     for method, limit in (("rk4", 2.785293563), ("explicit_euler", 2.0)):
         assert at.limit(method) == ("finite", pytest.approx(limit / 3.0, rel=1e-6))
     assert at.limit("semi_implicit_euler") == ("never_fails", None)
-
-
-def test_the_swing_is_its_elliptic_function():
-    tree = next(case for case in ARM.cases if len(case.joints) == 1).tree
-    hanging, frequency = pendulum(tree)
-    assert hanging == pytest.approx(np.pi / 2)
-    assert frequency**2 == pytest.approx(41.8436, abs=5e-5)  # the assignment's f1
-    t = np.linspace(0.0, 3.0, 61)
-    for q, qd in ((0.0, 0.0), (0.3, 4.0), (2.0, -7.0), (8.0, 1.0)):
-        exact = swing(t, q, qd, hanging, frequency)
-        assert exact[0] == pytest.approx(q) and np.ptp(exact) > 0.3
-        assert distance(exact, exact_swing(t, q, qd, hanging, frequency)).max() < 1e-14 * (1.0 + 30.0)
-        _, path, _ = tmt.simulate([q], [qd], [0.0], 3.0 / 3000, 3000, model=tree)
-        assert np.abs(path[::50, 0] - exact).max() < 2e-9
-    assert np.isnan(swing(t, 0.0, 20.0, hanging, frequency)).all()  # turns over

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -16,15 +15,17 @@ from ...engines.mujoco.names import number_of_actuators
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, assets_of, files_of, finished, of_parts
 from ...engines.mujoco.source import Source
+from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit, number_or_none
+from ...judge.scale import EPS, FACTOR
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ..setup import Setup
-from .records import FreeRow, JointRow, PairRow, StageRow, SubsetRow, UseRow
+from .records import FreeRow, JointRow, PairRow, StageRow, UseRow
 from .scene import Scene, scene_of
 from .search import Answer, Locks, compared_limits, frontier, seconds_of, stable_answers, take_out
-from .sub_blocks import check_blocks, differences, units_of
+from .written import draft_of, move
 
 TEXT = "reduction_of_file"  # the template
 ERROR = 1e-3  # rad or m, if none is asked for
@@ -74,12 +75,15 @@ def add(result: Result, setup: Setup, reading: Reading) -> None:
         "free": [row for row, _ in kinds],
     }
     add_tables(result, scene, locks, list(locked), kinds, small)
-    with TemporaryDirectory() as folder:
-        path = Path(setup.request.write or Path(folder) / "smaller.xml")
-        facts["assets"] = assets_of(path).name if files_of(small.spec) else ""
-        small.write(path, block(TEXT, "comment", facts=facts))
-        written = Smaller.whole(Source(path))
-    facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, written)
+    path = Path(setup.request.write) if setup.request.write else None
+    with draft_of(path) as draft:
+        facts["assets"] = assets_of(draft).name if files_of(small.spec) else ""
+        small.write(draft, block(TEXT, "comment", facts=facts))
+        written = Smaller.whole(Source(draft))
+        facts["digits"] = add_checks(result, scene, locks.free, locked, chosen, small, written)
+        facts["is_written"] = path and all(check.passed for check in result.checks)
+        if path and facts["is_written"]:
+            move(draft, path)
     result.tables["reduction_frontier"] = rows
     integrators = list(dict.fromkeys((reading.integrator, row.integrator, DEFAULT)))
     result.tables["reduction_limits"] = compared_limits(scene, small, integrators)
@@ -161,8 +165,16 @@ def compare_locked(result: Result, where: str, tree: Tree, smaller: Tree) -> Non
     bodies, others = tree.body_joint, smaller.body_joint
     fused = np.array([bodies.count(joint) - others.count(joint) + 1 for joint in bodies])
     scale = Entries(tree, q, v, np.maximum(1, fused))
-    both = [(tmt.mass_matrix(q, model=model), tmt.bias(q, v, model=model)) for model in (tree, smaller)]
-    compared = differences({"lock of tmt to the smaller model": both}, (scale.mass_matrix, scale.bias))
-    for (quantity, pair), (apart, sizes) in compared.items():
-        row = SubsetRow(locked="", quantity=quantity, parties=pair, unit=units_of(coordinates)[quantity])
-        check_blocks(result, where, row, apart, sizes)
+    mass = [tmt.mass_matrix(q, model=model) for model in (tree, smaller)]
+    bias = [tmt.bias(q, v, model=model) for model in (tree, smaller)]
+    is_mixed = "slide" in coordinates.all_kinds
+    for name, unit, (locked, other), scales in (
+        ("Mbar", "kg m2, kg m or kg" if is_mixed else "kg m2", mass, scale.mass_matrix),
+        ("bias", "N m or N" if is_mixed else "N m", bias, scale.bias),
+    ):
+        apart, largest = worst_of_each(locked - other, scales)
+        (worst,) = closest(apart, largest)
+        tolerance = FACTOR * EPS * largest[worst]
+        result.check(
+            where, f"{name}, lock of tmt to the smaller model", apart[worst], tolerance, unit, rounding=True
+        )

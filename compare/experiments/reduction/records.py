@@ -12,19 +12,6 @@ class NeedRow(Row):
     why_needed: str
 
 
-@dataclass(kw_only=True)
-class SubsetRow(Row):
-    """Blocks of Mbar or of the bias with joints locked."""
-
-    locked: str = column(names=True)
-    quantity: str
-    parties: str
-    states: int = 0
-    largest_difference: float | None = None
-    unit: str
-    difference_over_bar: float | None = None
-
-
 @dataclass
 class StageRow(Row):
     """A stage of a step by MuJoCo's timers: of the whole file, without what is not used, smaller."""

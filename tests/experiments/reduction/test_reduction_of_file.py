@@ -11,10 +11,8 @@ import pytest
 from edited import setup_of_file
 
 import tmt
-from compare.cli.command_line import request
 from compare.core.check import Result
 from compare.core.text import say
-from compare.engines.mujoco import ModelError
 from compare.engines.mujoco.motion import Simulation
 from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.smaller import Smaller, finished
@@ -26,7 +24,6 @@ from compare.experiments.reduction.scene import scene_of
 from compare.experiments.reduction.search import answer_within, compared_limits, stable_answers, take_out
 from compare.experiments.setup import Request
 from compare.robots.scene_file import SceneError, read_controls, read_scenes
-from compare.run.reference import compared_with
 
 ARM = """<body name="{0}" pos="{1} 0 1"><joint name="{0} upper" axis="0 1 0" damping="0.1" range="-170 170"/>
 <geom size="0.05" mass="1" pos="0 0 -0.2"/><body name="{0} hand" pos="0 0 -0.4">
@@ -193,20 +190,6 @@ def test_the_written_file_is_moved_with_its_meshes(tmp_path):
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "elsewhere" / "smaller.xml"))
     assert model.nmesh == 2
     assert "smaller_assets" in say(result.top[0])
-
-
-@pytest.mark.parametrize("option, value, message", [
-    ("--write", "{}/arms.xml", "of the robot itself"), ("--write", "{}/none/small.xml", "no such folder"),
-    ("--write", "{}", "it is a folder"), ("--points", "nothing", "no body and no site 'nothing'"),
-])  # fmt: skip
-def test_what_the_file_does_not_have_or_cannot_be_written_is_refused_at_once(
-    tmp_path, option, value, message
-):
-    path = tmp_path / "arms.xml"
-    path.write_text(TWO_ARMS)
-    options = request(["reduction", "--mjcf", str(path), option, value.format(tmp_path)])
-    with pytest.raises(ModelError, match=message):
-        compared_with(None, str(path)).request_of(options)
 
 
 PULLED = """<mujoco><worldbody><body name="hand" mocap="true" pos="0.3 0 1"/><body name="arm" pos="0 0 1">

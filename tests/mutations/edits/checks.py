@@ -8,7 +8,6 @@ CHECKS = (
     ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
     ("conclusions", "check_same_schemes", "quantity"), ("conclusions", "check_stopped", "quantity"),
     ("conclusions", "check_smallest_errors", "quantity"),
-    ("reduction", "rows", "quantity"), ("sub_blocks", "check_blocks", "name"),
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("followed", "check_closest", "quantity"),
     ("trajectory.errors", "check_order", "name"), ("stability.limits", "check_limits", "what"),
