@@ -21,7 +21,7 @@ INTEGRATORS = {name: member for name, member in MEMBERS.items() if member is not
 EVALUATIONS = dict.fromkeys(INTEGRATORS, 1) | {"RK4": 4}  # of the dynamics, in a step
 OF_A_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)  # transmissions
 # dynamics of an activation that settles where its control leads, or stays
-SETTLING = [getattr(mujoco.mjtDyn, f"mjDYN_{name}") for name in ("INTEGRATOR", "FILTER", "FILTEREXACT")]
+SETTLING = [int(getattr(mujoco.mjtDyn, f"mjDYN_{name}")) for name in ("INTEGRATOR", "FILTER", "FILTEREXACT")]
 FREE_PARTS = ("x", "y", "z", "turn")
 
 
@@ -155,7 +155,7 @@ def set_control(m: mujoco.MjModel, actuator: int, u: float, ctrl: np.ndarray, ac
     kind = mujoco.mjtDyn(m.actuator_dyntype[actuator])
     if inputs == 1:
         ctrl[place] = 0.0 if kind == mujoco.mjtDyn.mjDYN_INTEGRATOR else u
-    if kind in SETTLING:
+    if int(kind) in SETTLING:
         act[m.actuator_actadr[actuator]] = u
 
 

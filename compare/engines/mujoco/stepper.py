@@ -274,9 +274,10 @@ def holding(m: mujoco.MjModel, actuator: int, length: float) -> float | None:
     gain, bias = m.actuator_gainprm[actuator], m.actuator_biasprm[actuator]
     kind = m.actuator_dyntype[actuator]
     is_affine = m.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
-    is_affine &= m.actuator_gaintype[actuator] in (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtGain.mjGAIN_AFFINE)
+    gains = [int(kind) for kind in (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtGain.mjGAIN_AFFINE)]
+    is_affine &= m.actuator_gaintype[actuator] in gains
     place, inputs = control_of(m, actuator)
-    if not is_affine or inputs != 1 or kind not in (mujoco.mjtDyn.mjDYN_NONE, *SETTLING) or not bias[1]:
+    if not is_affine or inputs != 1 or kind not in (int(mujoco.mjtDyn.mjDYN_NONE), *SETTLING) or not bias[1]:
         return None
     slope = gain[1] if m.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE else 0.0
     factor = gain[0] + slope * length

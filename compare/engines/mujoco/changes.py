@@ -1,0 +1,175 @@
+"""Changes of a compiled model: each takes a model and gives a changed copy, or None if nothing would change."""
+
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .names import bit, control_of, number_of_actuators, output_of
+
+NO_BIAS, AFFINE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
+FIXED_GAIN, AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE)
+OVERRIDE = mujoco.mjtEnableBit.mjENBL_OVERRIDE  # the options' contact parameters replace those of geoms
+
+
+def changed(model: mujoco.MjModel, **numbers: ArrayLike) -> mujoco.MjModel:
+    """A copy with other numbers, by the names of fields of the model or of its options."""
+    copy = mujoco.MjModel.__copy__(model)
+    for name, values in numbers.items():
+        if not hasattr(copy.opt, name):
+            getattr(copy, name)[:] = values
+        elif np.ndim(getattr(copy.opt, name)):
+            getattr(copy.opt, name)[:] = values
+        else:
+            setattr(copy.opt, name, values)
+    return copy
+
+
+def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
+    """With more armature at each hinge and slide: a factor times the least inertia of it at qpos0, 1 / (M^-1)_ii.
+
+    Of bodies whose inertia never changes the compiler keeps it ready in dof_M0, which therefore changes too.
+    """
+    more = factor / np.maximum(model.dof_invweight0, mujoco.mjMINVAL)
+    kinds = model.jnt_type[model.dof_jntid]
+    more[(kinds == mujoco.mjtJoint.mjJNT_FREE) | (kinds == mujoco.mjtJoint.mjJNT_BALL)] = 0.0
+    if not more.any():
+        return None
+    return changed(model, dof_armature=model.dof_armature + more, dof_M0=model.dof_M0 + more)
+
+
+def with_kv(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
+    """With the speed gain of every servo and damper times a factor, and the targets that they have.
+
+    A velocity servo, kv (u - speed), has kv in its gain as well; a damper, -kv u speed, there alone.
+    """
+    gain, bias = model.actuator_gainprm.copy(), model.actuator_biasprm.copy()
+    is_affine = model.actuator_biastype == AFFINE_BIAS
+    of_gain = model.actuator_gaintype == AFFINE_GAIN
+    is_velocity_servo = is_affine & (bias[:, 1] == 0.0) & (bias[:, 2] != 0.0) & (gain[:, 0] == -bias[:, 2])
+    gain[is_velocity_servo, 0] *= factor
+    bias[is_affine, 2] *= factor
+    gain[of_gain, 2] *= factor
+    if np.array_equal(gain, model.actuator_gainprm) and np.array_equal(bias, model.actuator_biasprm):
+        return None
+    return changed(model, actuator_gainprm=gain, actuator_biasprm=bias)
+
+
+def with_slower_contacts(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
+    """With the time constants of all contacts times a factor: of geoms, of pairs, or those of the options.
+
+    None: all of them are stated by stiffness and damping, as numbers that are not positive.
+    """
+    fields = ("o_solref",) if model.opt.enableflags & OVERRIDE else ("geom_solref", "pair_solref")
+    numbers = {}
+    for field in fields:
+        solref = np.array(getattr(model.opt if field == "o_solref" else model, field))
+        times = solref[..., 0]
+        solref[..., 0] = np.where(times > 0.0, factor * times, times)
+        if (times > 0.0).any():
+            numbers[field] = solref
+    return changed(model, **numbers) if numbers else None
+
+
+def with_iterations(model: mujoco.MjModel, count: int) -> mujoco.MjModel | None:
+    """With at least so many iterations of the solver, and of each line search; None: it has as many."""
+    option = model.opt
+    if min(option.iterations, option.ls_iterations) >= count:
+        return None
+    return changed(
+        model, iterations=max(option.iterations, count), ls_iterations=max(option.ls_iterations, count)
+    )
+
+
+def with_noslip(model: mujoco.MjModel, count: int) -> mujoco.MjModel:
+    """With so many iterations of the solver that takes slip away."""
+    return changed(model, noslip_iterations=count)
+
+
+def with_impratio(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
+    """With a factor times the ratio of frictional to normal impedance of contacts."""
+    return changed(model, impratio=factor * model.opt.impratio)
+
+
+def with_other_cone(model: mujoco.MjModel) -> mujoco.MjModel:
+    """With elliptic friction cones for pyramidal ones, or the other way."""
+    return changed(model, cone=1 - model.opt.cone)
+
+
+def without_contacts(model: mujoco.MjModel) -> mujoco.MjModel | None:
+    """Without any contact; None: the file has them disabled."""
+    flags = model.opt.disableflags
+    return None if flags & bit("CONTACT") else changed(model, disableflags=flags | bit("CONTACT"))
+
+
+def with_exact_solver(model: mujoco.MjModel) -> mujoco.MjModel:
+    """With forces of constraints that are exact to rounding, by Newton's method, and zones that are kept."""
+    return changed(
+        model, solver=mujoco.mjtSolver.mjSOL_NEWTON, tolerance=1e-15, iterations=200, ls_iterations=100,
+        disableflags=model.opt.disableflags | bit("ISLAND"),
+    )  # fmt: skip
+
+
+class Program(NamedTuple):
+    """A controller outside of MuJoCo: the model that it drives, and the law by which it computes controls.
+
+    places: of its controls, (n,); outputs: of the lengths and speeds that it reads, (n,). Each control is
+    (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot; gain, bias: (n, 3), u: (n,).
+    """
+
+    model: mujoco.MjModel
+    places: np.ndarray
+    outputs: np.ndarray
+    gain: np.ndarray
+    bias: np.ndarray
+    u: np.ndarray
+
+    def controls(self, data: mujoco.MjData) -> np.ndarray:
+        """The controls, (n,), for the lengths and speeds of the data, which must be computed: mj_step1."""
+        lengths, speeds = data.actuator_length[self.outputs], data.actuator_velocity[self.outputs]
+        read = np.stack([np.ones(len(lengths)), lengths, speeds], axis=1)
+        return np.asarray((self.gain * read).sum(axis=1) * self.u + (self.bias * read).sum(axis=1))
+
+
+def program(
+    model: mujoco.MjModel, controls: np.ndarray, lengths: np.ndarray, kp: float | None = None,
+    kv: float | None = None,
+) -> Program | None:  # fmt: skip
+    """The servos of a model, or its motors, in a program; None: it has none of them.
+
+    Without gains it is the servos: motors of gain 1 take their places, whose force the program computes by the
+    servos' own law at their controls, (nu,). With kp or kv (of which the other one is 0) it is the motors, whose
+    law stays as it is: their control is kp (target - length) - kv speed. lengths: the targets, of each output.
+    """
+    copy, given = mujoco.MjModel.__copy__(model), kp is not None or kv is not None
+    places, outputs, gains, biases, us = list[int](), list[int](), [], [], []
+    for i in range(number_of_actuators(model)):
+        place, inputs = control_of(model, i)
+        is_known = model.actuator_gaintype[i] in (FIXED_GAIN, AFFINE_GAIN) and inputs == 1
+        is_known &= model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE
+        gain = model.actuator_gainprm[i, :3] * [1.0, *2 * [model.actuator_gaintype[i] == AFFINE_GAIN]]
+        bias = model.actuator_biasprm[i, :3] * (model.actuator_biastype[i] == AFFINE_BIAS)
+        is_servo = gain[1:].any() or bias[1:].any()
+        is_known &= model.actuator_biastype[i] in (NO_BIAS, AFFINE_BIAS)
+        if not is_known or is_servo == given:
+            continue
+        u = float(controls[place])
+        if model.actuator_ctrllimited[place] and not model.opt.disableflags & bit("CLAMPCTRL"):
+            u = float(np.clip(u, *model.actuator_ctrlrange[place]))
+        if given:
+            stiffness, damping = kp or 0.0, kv or 0.0
+            gain, u = np.zeros(3), 0.0
+            bias = np.array([stiffness * lengths[output_of(model, i)], -stiffness, -damping])
+        else:
+            copy.actuator_gaintype[i], copy.actuator_biastype[i] = FIXED_GAIN, NO_BIAS
+            copy.actuator_gainprm[i], copy.actuator_biasprm[i] = np.eye(len(copy.actuator_gainprm[i]))[0], 0.0
+            copy.actuator_ctrllimited[place] = 0
+        places.append(place)
+        outputs.append(output_of(model, i))
+        gains.append(gain)
+        biases.append(bias)
+        us.append(u)
+    if not places:
+        return None
+    return Program(copy, *map(np.array, (places, outputs, gains, biases, us)))

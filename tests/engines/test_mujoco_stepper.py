@@ -1,0 +1,289 @@
+"""Runs, derivatives and starts of a file against plain MuJoCo, and changes of a model by what they do to forces."""
+
+import mujoco
+import numpy as np
+import pytest
+from models import PATHS
+
+from compare.engines.mujoco import changes
+from compare.engines.mujoco.names import INTEGRATORS
+from compare.engines.mujoco.stepper import Stepper
+
+HINGE = """<mujoco><option timestep="0.01"/><worldbody><body><joint name="j" axis="0 0 1"/>
+  <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody>
+  <actuator>{}</actuator><keyframe>{}</keyframe></mujoco>"""
+BALL = """<mujoco><option timestep="0.002" {option}/><worldbody><geom name="floor" type="plane" size="1 1 1" {floor}/>
+  <body pos="0 0 0.1"><freejoint/><geom name="ball" size="0.1" {floor}/></body></worldbody>
+  <contact>{pair}</contact></mujoco>"""
+STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+
+
+def plain(name, dt, integrator):
+    """A model and data of MuJoCo at its first keyframe, pushed."""
+    model = mujoco.MjModel.from_xml_path(str(PATHS[name]))
+    model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    data.qvel += 0.1 * np.sign(np.random.default_rng(3).normal(size=model.nv))
+    return model, data
+
+
+def state_of(model, data):
+    state = np.zeros(mujoco.mj_stateSize(model, STATE))
+    mujoco.mj_getState(model, data, state, STATE)
+    return state
+
+
+def ends_of(data, steps):
+    """Positions and speeds after each step of plain MuJoCo."""
+    path = []
+    for _ in range(steps):
+        mujoco.mj_step(data.model, data)
+        path.append(np.r_[data.qpos, data.qvel])
+    return np.array(path)
+
+
+@pytest.mark.parametrize("name", ["quadruped", "gripper", "mixed", "loop"])
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast", "RK4"])
+def test_runs_are_those_of_mj_step_bit_by_bit_in_one_roll_in_two_and_watched(name, integrator):
+    model, data = plain(name, 0.004, integrator)
+    stepper, start = Stepper(model, 0.004, integrator), state_of(model, data)
+    other = start.copy()
+    other[stepper.places["qvel"]] *= -0.5
+    exact = ends_of(data, 60)
+    whole, first = stepper.roll([start, other], 60), stepper.roll([start, other], 23)
+    second = stepper.roll(first.states, 37)
+    assert np.array_equal(np.hstack([whole.q[0], whole.v[0]]), exact) and not np.array_equal(*whole.q)
+    assert np.array_equal(np.concatenate([first.v, second.v], axis=1), whole.v)
+    assert np.array_equal(second.states, whole.states) and np.array_equal(
+        whole.states[0], state_of(model, data)
+    )
+    watched = [np.r_[d.qpos, d.qvel] for d in stepper.watch(start, 60)]
+    assert np.array_equal(watched, exact) and whole.ended.tolist() == [60, 60]
+
+
+def test_inputs_of_a_roll_are_those_of_a_program_in_plain_steps():
+    model, data = plain("quadruped", 0.002, "implicitfast")
+    stepper, start = Stepper(model, 0.002, "implicitfast"), state_of(model, data)
+    inputs = data.ctrl + 0.2 * np.random.default_rng(1).normal(size=(20, model.nu))
+    data.qfrc_applied[6:] = 0.3
+    start[stepper.places["qfrc_applied"]] = data.qfrc_applied
+    path = []
+    for row in inputs:
+        data.ctrl[:] = row
+        mujoco.mj_step(model, data)
+        path.append(data.qpos.copy())
+    rolled = stepper.roll(start, 20, inputs)
+    assert np.array_equal(rolled.q[0], path)
+
+    def act(step, d):
+        d.ctrl[:] = inputs[step]
+
+    assert np.array_equal([d.qpos.copy() for d in stepper.watch(start, 20, act)], path)
+
+
+def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():
+    text = HINGE.format(
+        '<general joint="j" biastype="affine" biasprm="0 1e6 0"/>', '<key name="k" qpos="1"/>'
+    )
+    stepper = Stepper(mujoco.MjModel.from_xml_string(text), 1.0, "Euler")
+    start, speed, count = stepper.start("k", controls=[0.0]), 0.0, 0
+    q = 1.0
+    while abs(1e6 * q) <= 1e10:  # the acceleration that MuJoCo refuses, of a semi-implicit step of 1 s
+        speed += 1e6 * q
+        q, count = q + speed, count + 1
+    assert 0 < count < 5
+    rolled = stepper.roll([start, stepper.start()], 8)
+    assert rolled.ended.tolist() == [count, 8] == [len(list(stepper.watch(start, 8))), 8]
+    assert np.isfinite(rolled.q[0, :count]).all() and np.isnan(rolled.q[0, count:]).all()
+    assert stepper.roll(rolled.states, 3).ended.tolist() == [0, 3]
+
+
+def test_a_warning_of_another_kind_does_not_end_a_run():
+    """Of 300 contacts in too small a memory MuJoCo leaves some out, warns, and goes on; its rollout does not."""
+    geoms = "".join(
+        f'<geom size="0.1" pos="0 0 {0.001 * k}" contype="1" conaffinity="2"/>' for k in range(30)
+    )
+    floor = '<geom type="plane" size="1 1 1" contype="2" conaffinity="1"/>' * 10
+    text = f"""<mujoco><size memory="100K"/><worldbody>{floor}<body pos="0 0 0.05"><freejoint/>{geoms}</body>
+      </worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    exact = ends_of(data, 10)
+    assert data.warning.number.any()
+    stepper = Stepper(model, model.opt.timestep, "Euler")
+    rolled = stepper.roll(stepper.start(), 10)
+    assert rolled.ended.tolist() == [10] and np.array_equal(rolled.q[0], exact[:, : model.nq])
+
+
+@pytest.mark.parametrize("by", ["ctrl", "qfrc_applied"])
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_a_step_has_the_derivative_of_the_closed_form(integrator, by):
+    """One hinge of 1 kg m2 on a servo: qdd = k (u - q) - c qd + tau; Euler's step, and Taylor's to order 4."""
+    k, c, dt = 30.0, 2.0, 0.02
+    stepper = Stepper(
+        mujoco.MjModel.from_xml_string(HINGE.format(f'<position joint="j" kp="{k}" kv="{c}"/>', "")),
+        dt,
+        integrator,
+    )
+    F, G = np.array([[0.0, 1.0], [-k, -c]]), np.array([[0.0], [k if by == "ctrl" else 1.0]])
+    terms = [np.eye(2), dt * F, dt**2 / 2 * F @ F, dt**3 / 6 * F @ F @ F, dt**4 / 24 * F @ F @ F @ F]
+    A, integral = sum(terms), dt * (np.eye(2) + dt / 2 * F + dt**2 / 6 * F @ F + dt**3 / 24 * F @ F @ F)
+    B = integral @ G
+    if integrator == "Euler":
+        speed = np.array([[-dt * k, 1.0 - dt * c]])
+        A, B = np.vstack([[1.0, 0.0] + dt * speed, speed]), np.vstack([dt**2 * G[1], dt * G[1]])
+    for centred in (True, False):
+        found = stepper.derivative(stepper.start(q=[0.3], controls=[0.1]), 1e-6, centred, by)
+        assert np.allclose(found[0], A, atol=1e-9) and np.allclose(found[1], B, atol=1e-9)
+
+
+def test_differences_are_one_sided_at_the_end_of_a_range():
+    """A muscle's activation is never below 0, a control never above its range."""
+    muscle = '<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/><motor joint="j" ctrlrange="-1 1"/>'
+    stepper = Stepper(mujoco.MjModel.from_xml_string(HINGE.format(muscle, "")), 0.01, "Euler")
+    start = stepper.start(controls=[0.0, 1.0])
+    A, B = stepper.derivative(start, 1e-6)
+    assert np.isfinite(A).all() and A[2, 2] == pytest.approx(1.0 - 0.01 / (0.04 / 0.5), rel=1e-3)  # off at 0
+    assert B[1, 1] == pytest.approx(0.01)
+
+
+SERVO = '<position joint="j" kp="20" kv="1" {}/>'
+STARTS = {  # actuators, what the keyframe states; the control and the activation at the start
+    "stated": (SERVO, 'ctrl="0.7"', 0.7, None),
+    "a servo holds the posture": (SERVO, "", 0.4, None),
+    "within its range": (SERVO.format('ctrlrange="-0.2 0.2"'), "", 0.2, None),
+    "by its law": ('<general joint="j" gainprm="2" biastype="affine" biasprm="1 -20 -1"/>', "", 3.5, None),
+    "a filter": (SERVO.format('timeconst="0.1"'), "", 0.4, 0.4),
+    "a filter that is stated": (SERVO.format('timeconst="0.1"'), 'ctrl="0.7" act="0.2"', 0.7, 0.2),
+    "an integrator": ('<intvelocity joint="j" kp="9" actrange="-1 1"/>', "", 0.0, 0.4),
+    "an integrator that is stated": (
+        '<intvelocity joint="j" kp="9" actrange="-1 1"/>',
+        'act="0.1"',
+        0.0,
+        0.1,
+    ),
+    "a motor": ('<motor joint="j"/>', "", 0.0, None),
+    "a velocity servo": ('<velocity joint="j" kv="2"/>', "", 0.0, None),
+    "a muscle": ('<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/>', "", 0.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("kind", STARTS)
+def test_a_start_has_the_controls_of_its_keyframe_else_servos_hold_the_posture(kind):
+    actuators, stated, control, activation = STARTS[kind]
+    model = mujoco.MjModel.from_xml_string(
+        HINGE.format(actuators.replace("{}", ""), f'<key name="k" qpos="0.4" qvel="2" {stated}/>')
+    )
+    stepper = Stepper(model, 0.01, "Euler")
+    for start in (stepper.start("k"), *([] if stated else [stepper.start(q=[0.4], v=[2.0])])):
+        assert start[stepper.places["qpos"]] == 0.4 and start[stepper.places["qvel"]] == 2.0
+        assert start[stepper.places["ctrl"]] == pytest.approx(control)
+        if activation is not None:
+            assert start[stepper.places["act"]] == pytest.approx(activation)
+    assert stepper.start("k", q=[0.1])[stepper.places["qvel"]] == 0.0
+    assert stepper.start("k", controls=[0.05])[stepper.places["ctrl"]] == 0.05
+    with pytest.raises(KeyError):
+        stepper.start("no such")
+
+
+def forces(model, q, v, u):
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:], data.ctrl[:] = q, v, u
+    mujoco.mj_forward(model, data)
+    return float(data.qfrc_actuator[0])
+
+
+@pytest.mark.parametrize("actuator, exact", [
+    ('<position joint="j" kp="20" kv="3"/>', lambda q, v, u, kv: 20.0 * (u - q) - 3.0 * kv * v),
+    ('<velocity joint="j" kv="3"/>', lambda q, v, u, kv: 3.0 * kv * (u - v)),
+    ('<damper joint="j" kv="3" ctrlrange="0 1"/>', lambda q, v, u, kv: -3.0 * kv * u * v),
+    ('<general joint="j" gainprm="2" biastype="affine" biasprm="0 0 -3"/>', lambda q, v, u, kv: 2.0 * u - 3.0 * kv * v),
+    ('<intvelocity joint="j" kp="20" kv="3" actrange="-1 1"/>', lambda q, v, u, kv: -20.0 * q - 3.0 * kv * v),
+])  # fmt: skip
+def test_kv_of_every_servo_and_damper_changes_and_its_target_does_not(actuator, exact):
+    model = mujoco.MjModel.from_xml_string(HINGE.format(actuator, ""))
+    for factor in (1.0, 0.25):
+        found = model if factor == 1.0 else changes.with_kv(model, factor)
+        assert forces(found, 0.2, 0.7, 0.5) == pytest.approx(exact(0.2, 0.7, 0.5, factor))
+    assert forces(model, 0.2, 0.7, 0.5) == pytest.approx(exact(0.2, 0.7, 0.5, 1.0))  # as it was
+    motor = mujoco.MjModel.from_xml_string(HINGE.format('<motor joint="j"/>', ""))
+    assert changes.with_kv(motor, 0.25) is None
+
+
+FACTOR = 5.0
+CONTACTS = {  # option, geoms, pair; whether there is a time constant to change
+    "of geoms": ("", 'solref="0.01 1"', "", True),
+    "of a pair": (
+        "",
+        'contype="0" conaffinity="0"',
+        '<pair geom1="ball" geom2="floor" solref="0.01 1"/>',
+        True,
+    ),
+    "of the options": ('o_solref="0.01 1"><flag override="enable"/></option><option', "", "", True),
+    "by stiffness and damping": ("", 'solref="-1000 -50"', "", False),
+}
+
+
+@pytest.mark.parametrize("kind", CONTACTS)
+def test_slower_contacts_are_slower_wherever_their_time_is_stated(kind):
+    option, floor, pair, has_time = CONTACTS[kind]
+    model = mujoco.MjModel.from_xml_string(BALL.format(option=option, floor=floor, pair=pair))
+    slower = changes.with_slower_contacts(model, FACTOR)
+    assert (slower is not None) == has_time
+    if slower is not None:
+        stiffness = []
+        for found in (model, slower):
+            data = mujoco.MjData(found)
+            data.qpos[2] = 0.095
+            mujoco.mj_forward(found, data)
+            stiffness.append(data.efc_KBIP[0, 0])
+        assert stiffness[0] == pytest.approx(FACTOR**2 * stiffness[1])
+
+
+def test_changes_are_of_a_copy_and_of_what_they_name():
+    model = mujoco.MjModel.from_xml_path(str(PATHS["quadruped"]))
+    heavier, still = changes.with_armature(model, 0.1), changes.without_contacts(model)
+    data, full = mujoco.MjData(model), np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, full)
+    least = 1.0 / np.diag(np.linalg.inv(full))
+    assert heavier.dof_armature[:6] == pytest.approx(model.dof_armature[:6])
+    assert heavier.dof_armature[6:] - model.dof_armature[6:] == pytest.approx(0.1 * least[6:], rel=0.2)
+    data = mujoco.MjData(still)
+    mujoco.mj_resetDataKeyframe(still, data, 0)
+    mujoco.mj_forward(still, data)
+    assert data.ncon == 0 and changes.without_contacts(still) is None
+    assert changes.with_iterations(model, 5000).opt.iterations == 5000
+    assert changes.with_iterations(model, 1) is None
+    assert changes.with_noslip(model, 4).opt.noslip_iterations == 4
+    assert changes.with_impratio(model, 3.0).opt.impratio == 3.0 * model.opt.impratio
+    assert changes.with_other_cone(model).opt.cone != model.opt.cone
+    assert changes.changed(model, gravity=[0.0, 0.0, 1.0]).opt.gravity.tolist() == [0.0, 0.0, 1.0]
+    assert model.opt.noslip_iterations == 0 and model.opt.gravity[2] < 0.0
+
+
+@pytest.mark.parametrize("actuator, gains, exact", [
+    ('<position joint="j" kp="20" kv="3"/>', {}, lambda q, v: 20.0 * (0.5 - q) - 3.0 * v),
+    ('<position joint="j" kp="20" ctrlrange="-0.1 0.1"/>', {}, lambda q, v: 20.0 * (0.1 - q)),
+    ('<damper joint="j" kv="3" ctrlrange="0 1"/>', {}, lambda q, v: -1.5 * v),
+    ('<motor joint="j"/>', {"kp": 7.0, "kv": 2.0}, lambda q, v: 7.0 * (0.1 - q) - 2.0 * v),
+    ('<motor joint="j"/>', {"kp": 0.0, "kv": 2.0}, lambda q, v: -2.0 * v),
+    ('<motor joint="j"/>', {"kv": 2.0}, lambda q, v: -2.0 * v),
+    ('<motor joint="j"/>', {}, None), ('<position joint="j" kp="20" kv="3"/>', {"kp": 7.0}, None),
+])  # fmt: skip
+def test_a_program_has_the_law_of_the_servos_that_it_replaces_or_the_gains_that_are_given(
+    actuator, gains, exact
+):
+    model = mujoco.MjModel.from_xml_string(HINGE.format(actuator, ""))
+    found = changes.program(model, np.array([0.5]), np.array([0.1]), **gains)
+    assert (found is None) == (exact is None)
+    if found is not None:
+        data = mujoco.MjData(found.model)
+        data.qpos[:], data.qvel[:] = 0.2, 0.7
+        mujoco.mj_step1(found.model, data)
+        controls = found.controls(data)
+        assert controls == pytest.approx([exact(0.2, 0.7)])
+        assert forces(found.model, 0.2, 0.7, controls) == pytest.approx(exact(0.2, 0.7))
