@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from compare.core import timing
-from compare.core.check import Result
+from compare.core.check import Result, largest_known
 from compare.core.words import milliseconds, scene_of
 from compare.judge.agree import agree, closest
 from compare.robots.arm import ARM
@@ -71,6 +71,18 @@ def test_a_difference_is_allowed_64_eps_of_its_own_states_scale(eps, passes, sig
 
 
 @pytest.mark.parametrize("eps, passes", [(63, True), (65, False)])
+@pytest.mark.parametrize("value", [1.0, -3.0, 1e-3])
+def test_values_of_the_other_sign_differ_by_twice_their_size(eps, passes, value):
+    """Of the same sign they agree to 63 eps, and not to 65; of the other sign never."""
+    ours, theirs = np.full((2, 1), value), np.full((2, 1), value)
+    theirs[1] += eps * EPS * abs(value)
+    assert agreed(ours, theirs, abs(value))[1].passed is passes
+    theirs[1] = -value
+    (check,), row = agreed(ours, theirs, abs(value))
+    assert not check.passed and check.value == row.worst_difference == 2.0 * abs(value)
+
+
+@pytest.mark.parametrize("eps, passes", [(63, True), (65, False)])
 @pytest.mark.parametrize("entry", [(0, 0, 0), (2, 0, 1)])
 def test_each_entry_has_its_own_tolerance_if_the_scale_has(eps, passes, entry):
     """A small entry that is off fails beside a large one that is off by more, and passes where it may be."""
@@ -116,6 +128,14 @@ def test_the_distance_of_each_engine_from_the_exact_value_is_checked(eps, passes
 ])  # fmt: skip
 def test_the_difference_closest_to_its_tolerance(difference, tolerance, place):
     assert closest(np.array(difference), np.array(tolerance)) == (place,)
+
+
+@pytest.mark.parametrize("values, largest", [
+    ([1.0, 3.0, 2.0], 3.0), ([1.0, None], 1.0), ([None], None), ([], None), ([-2.0, -1.0], -1.0),
+    ([1.0, np.nan], np.inf), ([np.nan, 1.0, None], np.inf),
+])  # fmt: skip
+def test_the_largest_of_values_of_which_some_are_not_known_or_no_numbers(values, largest):
+    assert largest_known(values) == largest
 
 
 def test_what_is_compared_is_called_in_turns_and_the_first_call_is_not_counted(monkeypatch):

@@ -4,6 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from trees import one_body
 
 import tmt
 from compare.judge import entries, scale
@@ -96,6 +98,65 @@ def test_forces_sum_weight_springs_and_what_moves():
     assert np.allclose(OF.bias, summed(moving) + weight, rtol=1e-13)
     tau, drag = np.full(6, 3.0), np.array(TREE.damping) * np.abs(QD)
     assert np.allclose(OF.force(tau)[0], OF.bias[0] + 3.0 + drag[0] + springs[0], rtol=1e-14)
+
+
+def test_energies_sum_weight_springs_and_motion():
+    """m g times the reach, k (|q| + |rest|)^2 / 2 of each joint, of a ball k pi^2 / 2 for each axis; |qd|' Mbar |qd| / 2."""
+    heights = np.array([sum(COUNT[b] * TREE.mass[b] * 5.0 * REACH[s, b] for b in range(3)) for s in range(2)])
+    slide = [20.0 * (0.7 + 0.1) ** 2, 20.0 * (0.05 + 0.1) ** 2]
+    hinge = [5.0 * (0.4 + 0.3) ** 2, 5.0 * (1.0 + 0.3) ** 2]
+    stored = heights + (np.array(slide) + hinge + 3.0 * 2.0 * np.pi**2) / 2.0
+    assert np.allclose(OF.potential_energy, stored, rtol=1e-13)
+    moving = summed(lambda b, s: TREE.mass[b] * (MOVES[b] @ np.abs(QD[s])) ** 2 + LARGEST[b] * (TURNS[b] @ np.abs(QD[s])) ** 2)
+    assert np.allclose(OF.energy, stored + (moving + np.array(TREE.armature) @ QD.T**2) / 2.0, rtol=1e-13)
+
+
+def test_rates_of_forces_sum_what_a_movement_changes_in_each_term():
+    """By a turn four times the terms of the bodies that it turns; by a slide levers by 1 and accelerations by S^2."""
+    qdd = np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0], [0.5, 0.0, -1.0, 0.0, 2.0, 7.0]])
+
+    def terms(b, s):
+        (S, V, w), sizes = moving_of(b, s), np.abs(qdd[s])
+        pushed, turning = MOVES[b] @ sizes + 2.0 * S * w + 5.0, TURNS[b] @ sizes + S**2
+        force, moment = TREE.mass[b] * pushed, LARGEST[b] * turning + TREE.mass[b] * V**2
+        return force, moment, TREE.mass[b] * turning
+
+    def by_movement(b, s):
+        force, moment, swung = terms(b, s)
+        by_turn, by_slide = force * MOVES[b] + moment * TURNS[b], force * TURNS[b] + swung * MOVES[b]
+        return 4.0 * (np.outer(by_turn, TURNS[b]) + np.outer(by_slide, SLIDES[b]))
+
+    def by_speed(b, s):
+        S, V, w = moving_of(b, s)
+        of_point = TREE.mass[b] * (S * np.outer(MOVES[b], MOVES[b]) + w * np.outer(MOVES[b], TURNS[b]))
+        of_turn = LARGEST[b] * S * np.outer(TURNS[b], TURNS[b]) + TREE.mass[b] * V * np.outer(TURNS[b], SLIDES[b])
+        return 2.0 * (of_point + of_turn)
+
+    by_q, by_qd = OF.force_rates(qdd)
+    assert np.allclose(by_q, summed(by_movement) + np.diag([20.0, 5.0, 2.0, 2.0, 2.0, 0.0]), rtol=1e-13)
+    assert np.allclose(by_qd, summed(by_speed) + np.diag(TREE.damping), rtol=1e-13)
+
+
+def test_rates_of_the_force_of_a_pendulum_are_at_most_a_few_of_its_own():
+    """d(tau)/dq of a bob of 2 kg at 0.5 m is at most m g l, d(tau)/dqd is 0: neither scale is far above the terms."""
+    bob = one_body([(0.0, 1.0, 0.0)], com=(0.0, 0.0, -0.5), mass=[2.0], inertia=1e-9 * np.eye(3))
+    q, lever = np.linspace(-3.0, 3.0, 13)[:, None], 0.5 + 0.5 / 8 + 0.5 / 64
+    by_q, by_qd = entries.Entries(bob, q, 3.0).force_rates(0.0)
+    assert np.abs(2.0 * 9.81 * 0.5 * np.cos(q)).max() < by_q.min()
+    assert by_q == pytest.approx(4.0 * 2.0 * lever * (9.81 + 2.0 * 3.0**2 * lever), rel=1e-6)
+    assert by_qd == pytest.approx(2.0 * 2.0 * 2.0 * 3.0 * lever**2, rel=1e-6)
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.1])
+def test_the_scale_of_a_step_is_carried_through_its_exponential(dt):
+    """Of a damped spring, qdd = -a q - b qd + c tau: beside SciPy's matrix exponential."""
+    spring = one_body([(1.0, 0.0, 0.0)], ("slide",), stiffness=(4.0,), damping=(0.5,), rest=(0.0,))
+    by, sizes = ([np.full((1, 1, 1), x) for x in row] for row in ((-2.0, -0.25, 0.5), (30.0, 7.0, 11.0)))
+    rates = np.array([[0.0, 1.0, 0.0], [2.0, 0.25, 0.5], [0.0, 0.0, 0.0]])
+    carried = expm(dt * rates)
+    expected = carried + dt * carried @ [[0.0, 1.0, 0.0], [30.0, 7.0, 11.0], [0.0, 0.0, 0.0]] @ carried
+    found = entries.Entries(spring, np.zeros((1, 1))).step(dt, (*by, None, None), (*sizes, None, None))
+    assert np.allclose(found[0], expected[:2], rtol=1e-4, atol=0.0)
 
 
 def test_errors_go_through_the_inverse_entry_by_entry():
