@@ -12,13 +12,14 @@ from trees import one_body
 import tmt
 from compare.core.check import Result
 from compare.engines.mujoco import read
-from compare.judge.order import ORDER_MARGIN, check_order
+from compare.judge.order import ORDER_MARGIN, check_order, is_higher
 from compare.judge.run import (
     check_movement,
     departure,
     deviation,
     diverged_at,
     leaves_no_digits,
+    required_time,
 )
 from compare.robots import Robot
 from compare.robots.actuators import Actuator, Drive
@@ -46,6 +47,26 @@ def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved)
         kinetic = share * allowed + at_first - gained
         new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(q, case.tree)[0, 0]), 0.0, 0.0])
         assert diverged_at(case, T, np.array([start, q]), np.array([rate, new])) == ends
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+@pytest.mark.parametrize("of_rates", [False, True])
+def test_a_run_has_diverged_where_a_number_is_not_finite(bad, of_rates):
+    case = CASES["bent, held"]
+    q, qd = np.tile(case.q, (4, 1)), np.zeros((4, 3))
+    times = np.arange(4.0)
+    assert diverged_at(case, times, q, qd) is None
+    (qd if of_rates else q)[2, 1] = bad
+    assert diverged_at(case, times, q, qd) == 2.0
+
+
+@pytest.mark.parametrize("scheme, dt, judged, least", [
+    ("rk4", 0.05, None, 1.0), ("rk4", 0.05, 0.6, 0.6), ("euler", 0.0099, 0.6, 0.6), ("euler", 0.0101, 0.6, 0.3),
+    ("euler", 0.0101, 0.2, 0.2), ("euler", 0.0101, None, 0.3),
+])  # fmt: skip
+def test_a_run_must_be_judged_for_the_time_of_its_scene_at_a_coarse_step_for_0_3_s(scheme, dt, judged, least):
+    case = ARM.case("x", duration=1.0, dt=1 / 64, judged=judged)
+    assert required_time(case, scheme, dt) == least
 
 
 def test_an_arm_has_left_at_a_tenth_of_a_radian():
@@ -140,3 +161,14 @@ def test_a_higher_order_is_that_of_the_same_scheme_in_tmt(share, passes, side, t
     measured = twin + side * share * ORDER_MARGIN
     check = checked(1, measured, "error", "", twin)
     assert check.passed == passes and f"tmt's same scheme {twin:.2f}" in check.note
+
+
+@pytest.mark.parametrize("measured", [np.nan, np.inf, -np.inf])
+def test_an_order_that_is_no_number_fails(measured):
+    assert not checked(4, measured).passed and checked(4, measured).value is None
+    assert not checked(1, measured, "error", "", 1.0).passed
+
+
+@pytest.mark.parametrize("measured, higher", [(2.14, False), (2.16, True), (1.0, False)])
+def test_an_order_is_higher_by_more_than_its_margin(measured, higher):
+    assert is_higher(measured, 2) is higher

@@ -147,6 +147,21 @@ def test_rates_of_the_force_of_a_pendulum_are_at_most_a_few_of_its_own():
     assert by_qd == pytest.approx(2.0 * 2.0 * 2.0 * 3.0 * lever**2, rel=1e-6)
 
 
+def test_derivatives_of_accelerations_go_through_the_inverse():
+    """Mbar d(qdd) = right - dMbar qdd: |Mbar^-1| times the terms of both sides, at |qdd| and what rounding may add to it."""
+    by = tmt.derivatives(Q[0], QD[0], np.ones(6), TREE)
+    by = by._replace(**{name: getattr(by, name)[None] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau")})
+    alone, M = entries.Entries(TREE, Q[:1], QD[:1]), tmt.mass_matrix(Q[0], TREE)
+    qdd = tmt.acceleration(Q[0], QD[0], np.ones(6), TREE)
+    inverse, factored = np.abs(np.linalg.inv(M)), OF.added[0] + np.outer(*[np.sqrt(np.diag(M))] * 2)
+    sizes = np.abs(qdd) + inverse @ (factored @ np.abs(qdd) + OF.force(1.0)[0])
+    by_q, by_qd = (part[0] for part in alone.force_rates(sizes))
+    found = alone.derivatives(1.0, qdd[None], by)
+    assert np.allclose(found[3][0], by_q, rtol=1e-12) and np.allclose(found[4][0], by_qd, rtol=1e-12)
+    for scale, right, slope in zip(found[:3], (by_q, by_qd, np.eye(6)), by[:3]):
+        assert np.allclose(scale[0], inverse @ (right + factored @ np.abs(slope[0])), rtol=1e-12)
+
+
 @pytest.mark.parametrize("dt", [0.01, 0.1])
 def test_the_scale_of_a_step_is_carried_through_its_exponential(dt):
     """Of a damped spring, qdd = -a q - b qd + c tau: beside SciPy's matrix exponential."""
