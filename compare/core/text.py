@@ -5,8 +5,10 @@ formatted there, with the filters below or Python's `format`.
 """
 
 import re
+from collections.abc import Sequence
 from functools import cache
 from html.entities import codepoint2name
+from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -24,6 +26,7 @@ MARKUP = re.compile(
     r"|(?<!\S)#|\A[\[ ]|\A[-+=](?=[-=\s]*\Z|\s)|\A\d(?=\d*[.)](?:\s|\Z))"
 )
 DOCUMENTS = "document.md.jinja", ".html.jinja"  # how their names end; the other templates are text
+ROW = "|"  # how the rows of a table of the first screen begin
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -94,10 +97,43 @@ def environment() -> Environment:
 
 
 def say(finding: Finding | str) -> str:
-    """The text of a finding, in one line. What is text already stays as it is."""
+    """The sentences of a finding, in one line. What is text already stays as it is."""
     if isinstance(finding, str):
         return finding
-    return " ".join(block(finding.of, finding.kind, **finding.values).split())
+    lines = block(finding.of, finding.kind, **finding.values).splitlines()
+    return " ".join(" ".join(line for line in lines if not line.startswith(ROW)).split())
+
+
+def screen(finding: Finding | str) -> list[str]:
+    """The lines of a finding on a terminal: its sentences before a table, the table, the sentences after it.
+
+    Lines of the template that begin with "|" are the rows of the table, the first one its head: cells are
+    separated by "|". Columns are aligned to the right, the first one, and those whose head begins with "<", to
+    the left.
+    """
+    if isinstance(finding, str):
+        return [finding]
+    lines = block(finding.of, finding.kind, **finding.values).splitlines()
+    rows = [number for number, line in enumerate(lines) if line.startswith(ROW)]
+    first, end = (rows[0], rows[-1] + 1) if rows else (len(lines), len(lines))
+    before, after = (" ".join(" ".join(part).split()) for part in (lines[:first], lines[end:]))
+    return [*filter(None, [before]), *aligned([lines[number] for number in rows]), *filter(None, [after])]
+
+
+def aligned(rows: Sequence[str]) -> list[str]:
+    """The lines of a table, after an empty one: see `screen`."""
+    if not rows:
+        return []
+    cells = [[cell.strip() for cell in row.strip().strip(ROW).split(ROW)] for row in rows]
+    columns = list(zip_longest(*cells, fillvalue=""))
+    widths = [max(map(len, column)) for column in columns]
+    to_left = [number == 0 or column[0].startswith("<") for number, column in enumerate(columns)]
+    made = [""]
+    for row in zip(*columns):
+        texts = (cell.removeprefix("<").ljust(width) if left else cell.rjust(width)
+                 for cell, width, left in zip(row, widths, to_left))  # fmt: skip
+        made.append(f" {'   '.join(texts)}".rstrip())
+    return made
 
 
 def block(of: str, kind: str, /, **values: Any) -> str:

@@ -10,7 +10,7 @@ from ..core.errors import described
 from ..core.finding import Finding
 from ..core.records import Experiment
 from ..core.rows import Row
-from ..core.text import block, say
+from ..core.text import block, say, screen
 from ..core.words import capital
 from ..robots import Robot
 
@@ -99,7 +99,8 @@ class Report(NamedTuple):
     def answer(self) -> list[str]:
         """The last lines of a run of one experiment: what is said of the robot, else its number."""
         numbers = [headline(section) for section in self.sections if section.result.checks]
-        return self.top or [f"{capital(number)}." for number in numbers if number]
+        lines = [line for section in self.sections for text in section.result.top for line in screen(text)]
+        return lines or [f"{capital(number)}." for number in numbers if number]
 
 
 class Failures(NamedTuple):

@@ -19,7 +19,7 @@ from sections import BAD, GOOD, section
 
 from compare.__main__ import main
 from compare.core.rows import Row, column
-from compare.core.text import cell, escaped
+from compare.core.text import aligned, cell, escaped
 from compare.core.words import in_one_line
 from compare.experiments import EXPERIMENTS
 from compare.report import files, style, tables
@@ -174,3 +174,17 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
     (line,) = run.stderr.splitlines()
     assert run.returncode == 2 and ROOT.as_posix() not in line
     assert re.search(r"RuntimeError: two lines \(compare/report/terminal.py:\d+\)$", line)
+
+
+def test_rows_of_a_table_are_aligned_after_an_empty_line():
+    rows = ["| model | error | <remark |", "| the file | - | |", "| x | 0.28 mm | the same bits |"]
+    expected = [
+        "",
+        " model        error   remark",
+        " the file         -",
+        " x          0.28 mm   the same bits",
+    ]
+    assert [" ".join(line.split()) for line in aligned(rows)] == [" ".join(line.split()) for line in expected]
+    lines = aligned(rows)
+    assert len({line.index(word) + len(word) for line, word in zip(lines[1:], ("error", "-", "mm"))}) == 1
+    assert lines[1].index("remark") == lines[3].index("the same bits") and aligned([]) == []
