@@ -1,4 +1,4 @@
-"""Runs of a method along a scene, timed and measured against its reference; differences of two runs."""
+"""Runs of a method along a scene: the path of an engine, single steps, and differences of two runs."""
 
 import time
 from collections.abc import Sequence
@@ -10,6 +10,7 @@ from ..core import timing
 from ..core.check import Check, Result
 from ..engines import Dynamics, Method, Motion, Setting
 from ..judge.agree import closest
+from ..judge.run import departure, diverged_at
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
 from ..truth.reference import Reference
@@ -17,6 +18,22 @@ from ..truth.reference import Reference
 States = Sequence[np.ndarray]  # q and v
 EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
 REGULAR = 3e-2  # rad: a smaller error up to EARLY falls with the order of the method
+
+
+class Path(NamedTuple):
+    """The run of one engine at each of its steps."""
+
+    q: np.ndarray  # (steps + 1, nq) rad
+    v: np.ndarray  # (steps + 1, nv)
+    ended: float | None = None  # s: when it diverged
+    left: float | None = None  # s: when it left its start
+
+
+def path_of(case: Case, dynamics: Dynamics, dt: float, steps: int, method: str) -> tuple[np.ndarray, Path]:
+    """The times, (steps + 1,) s, and the path of an engine in a case."""
+    motion = dynamics.run(*case.start, case.tau, dt, steps, method)
+    ended = diverged_at(case, motion.t, motion.q, motion.v)
+    return motion.t, Path(motion.q, motion.v, ended, departure(motion.t, motion.q, case.coordinates))
 
 
 class Followed(NamedTuple):

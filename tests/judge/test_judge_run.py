@@ -106,6 +106,14 @@ def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_ha
         assert diverged_at(case, t, q, wrong) == ends
 
 
+@pytest.mark.parametrize("lifted, ends", [(1e300, None), (1e308, 0.5)])
+def test_a_run_whose_energy_is_not_a_number_has_diverged(lifted, ends):
+    """Lifted by the force that balances its weight: the energy less the work is 0, and inf - inf."""
+    case = Robot("slide", None, alone("slide", gravity=(0.0, 0.0, -10.0)), {}, ()).case("held", torque=(20.0,))
+    q = np.array([[0.0], [lifted]])
+    assert diverged_at(case, T, q, np.zeros((2, 1))) == ends
+
+
 @pytest.mark.parametrize("start", [0.0, 0.3, -0.7])
 def test_a_servo_gives_no_more_than_it_has_stored(start):
     """At most 50 (0.2)^2 / 2 = 1 J beyond the 1 J that it has given when it is at its target."""

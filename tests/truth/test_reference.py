@@ -39,6 +39,17 @@ def test_a_run_in_doubles_is_made_finer_while_that_helps():
     assert known.error(doubles.high[:, :3]).max() < doubles.apart < 1e-12
 
 
+def test_the_accuracy_of_a_run_in_doubles_is_that_of_its_speeds_too():
+    """Which differ more than its positions from those of the run with half the steps."""
+    fast = BENT.changed(name="fast", speed=(500.0, 300.0, 800.0), duration=1.0, dt=1 / 64)
+    doubles, runs = reference.in_doubles(fast), []
+    for steps in (doubles.steps // 2, doubles.steps):
+        motion = tmt.simulate(*fast.start, fast.tau, 1.0 / steps, steps, "dopri8", fast.tree)
+        runs.append([values[:: steps // 64] for values in (motion.q, motion.qd)])
+    of_q, of_speeds = (np.abs(coarse - fine).max() for coarse, fine in zip(*runs))
+    assert of_speeds > 3.0 * of_q and doubles.apart == of_speeds
+
+
 def test_a_changed_scene_has_another_motion_and_an_equal_one_is_not_computed_again():
     before = reference.in_pairs.cache_info()
     first, again = (reference.reference(SHORT) for _ in range(2))

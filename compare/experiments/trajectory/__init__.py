@@ -2,13 +2,12 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
-from ...engines import LABELS, Engine
+from ...engines import LABELS, Engine, methods_in
 from ...engines.mujoco.names import INTEGRATORS
-from ...engines.own import Own
 from ...judge.rounding import NARROW
 from ...judge.run import MOVES, leaves_no_digits, movement_unit
 from ...robots import Robot
@@ -16,13 +15,12 @@ from ...robots.case import Case
 from ...truth.reference import RECORDS, Reference, reference
 from .. import Experiment
 from ..setup import Setup, different_first
-from . import errors, motion
+from . import errors
 from .runs import TrajectoryResult, follow, recorded
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
-FEW_SPEEDS = 8  # up to which a quick run of several experiments has all integrators in every scene
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4
 SHOWN = ["scene", "engine_integrator", "dt_s", "level", "largest_difference", "unit", "difference_over_band",
          "judged_until_s", "required_s", "diverged_at_s", "twin_diverged_at_s"]  # fmt: skip
@@ -30,11 +28,12 @@ skipped = leaves_no_digits
 
 
 class Work(NamedTuple):
+    """What begin starts."""
+
     runs: Iterable[TrajectoryResult]  # of each scene
-    energy: Iterable[Result]  # one
     names: Sequence[str]  # of the scenes whose true motion is computed
     true: Iterable[Reference]
-    left_out: Sequence[Finding]
+    left_out: Mapping[str, float | None]  # scenes: seconds that they would take; None: there is no method
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:
@@ -45,65 +44,51 @@ def begin(setup: Setup) -> Work:
     """Start the long work, in parallel, while other experiments compute. A quick run takes fewer scenes."""
     robot, engines = setup.robot, setup.engines
     cases = [case for case in robot.cases if not (setup.is_quick and "full only" in case.scene.tags)]
-    spread, finer = setup.map, setup.finer
-    left_out: list[Finding] = []
-    if robot.own:  # whose equations stay in this process
-        spread, finer = map, setup.finer[:1]
-        cases, left_out = within_time(setup, cases)
+    spread = map if robot.own else setup.map  # a user's equations stay in this process
+    finer = setup.finer[:1] if robot.own else setup.finer
+    left_out = cases_left_out(setup, cases)
+    cases = [case for case in cases if case.name not in left_out]
     # a file's robot has scenes with steps of their own
     fast = [] if robot.is_read else [case for case in cases if "speed" in case.scene.tags]
     true = [case for case in fast if case.steps == RECORDS]
-    cases = different_first(cases)
-    steps = setup.of(errors.STEPS, errors.FEW_STEPS, errors.FEW_STEPS)
-    runs = spread(partial(follow, engines=engines, finer=finer, few=few_integrators(setup)), cases)
-    drifts = spread(partial(errors.measure_energy, engines=engines, steps=steps), [robot])
-    return Work(runs, drifts, [case.name for case in true], spread(reference, true), left_out)
+    runs = spread(partial(follow, engines=engines, finer=finer), different_first(cases))
+    return Work(runs, [case.name for case in true], spread(reference, true), left_out)
 
 
-def few_integrators(setup: Setup) -> list[str]:
-    """RK4 and the file's own, for a large robot in a quick run of several experiments; [] for all integrators."""
-    is_short = setup.is_quick and not setup.alone
-    if setup.reading is None or not is_short or setup.robot.coordinates.nv <= FEW_SPEEDS:
-        return []
-    return sorted({"RK4", setup.reading.integrator})
-
-
-def within_time(setup: Setup, cases: Sequence[Case]) -> tuple[list[Case], list[Finding]]:
-    """The scenes that a user's own equations have and can follow in time, and a finding about the others."""
-    equations, seconds = cast(Own, setup.engines["own"]).equations, SECONDS_OF_OWN[setup.size]
+def cases_left_out(setup: Setup, cases: Sequence[Case]) -> dict[str, float | None]:
+    """Scenes that a user's own equations do not have or cannot follow in time, in the order of the scenes."""
+    left_out: dict[str, float | None] = {}
+    if not setup.own:
+        return left_out
+    equations, left = setup.own.equations, SECONDS_OF_OWN[setup.size]
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
     of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
-    unlike = [case.name for case in cases if case.controller or not case.scene.gravity]
-    able, slow, left = [], [], seconds
-    for case in [case for case in cases if case.name not in unlike]:
-        left -= of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case))
-        if left >= 0.0:
-            able.append(case)
-        else:
-            slow.append(case.name)
-    values = {"unlike": unlike, "slow": slow, "seconds": seconds}
-    return able, [Finding("trajectory", "own_left_out", values)] if unlike or slow else []
+    for case in cases:
+        if not methods_in(setup.own, case) or not case.scene.gravity:
+            left_out[case.name] = None
+            continue
+        seconds = of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case))
+        left -= seconds
+        if left < 0.0:
+            left_out[case.name] = seconds
+    return left_out
 
 
 def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
-    """Single steps and open loops of each scene, integrator and step; departures, errors, drift of energy."""
+    """Single steps and open loops of each scene, integrator and step; departures and errors."""
     robot, work = setup.robot, begin(setup) if work is None else work
     result = TrajectoryResult("trajectory", label=LABELS[robot.compared[0]], shown=SHOWN)
-    (drifts,) = work.energy
-    result.checks, result.tables["energy"] = drifts.checks, drifts.tables["energy"]
     for part in work.runs:
         result.rows += part.rows
         result.checks += part.checks
         result.runs += part.runs
-    errors.find_energy(result, setup.engines["mujoco"])
     errors.find_departures(result, robot)
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
     if rows := [row for row in result.of_beginnings if row.level == "open loop"]:
         result.find("beginnings", rows=rows)
-    result.notes += work.left_out
-    if few := few_integrators(setup):
-        result.find("few_integrators", integrators=few, speeds=FEW_SPEEDS)
+    if work.left_out:
+        result.find("left_out", scenes=work.left_out)
     return result
 
 
@@ -126,10 +111,12 @@ def cases_run(result: TrajectoryResult, robot: Robot) -> list[Case]:
 
 
 def headline(result: Result) -> Finding | None:
-    """The largest share of the band of rounding, and the number of scenes."""
+    """The largest share of the band of rounding, and the number of scenes; None if a check fails."""
     share = largest_known([row.difference_over_band for row in result.rows])
     scenes = len({row.scene for row in result.rows})
-    return None if share is None else result.finding("headline", scenes=scenes, share=share)
+    if share is None or any(check.failed for check in result.checks):
+        return None
+    return result.finding("headline", scenes=scenes, share=share)
 
 
 def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
@@ -144,7 +131,7 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
             yield partial(figures_runs.draw_held, result, run, numbers[case.name])
     for case in cases:
         yield partial(figures_runs.draw_run, result, case)
-    if drawn := motion.drawn_runs(robot, result.runs):
+    if drawn := figures_motion_gif.drawn_runs(robot, result.runs):
         yield partial(figures_motion_gif.draw_motion, drawn, result.label)
 
 

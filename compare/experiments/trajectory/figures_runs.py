@@ -47,7 +47,7 @@ def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Fig
     fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS + 1)
     caption = result.finding(
         "figure_held", number=number, scene=name, end=end, steps=run.steps, limit=LEFT, engines=engines,
-        judged=run.judged_until, apart=difference_while_judged(run),
+        judged=run.judged_until, apart=difference_while_judged(run), unit=movement_unit(run.case.coordinates),
     )  # fmt: skip
     return f"assignment_figure_{number}", fig, caption
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -11,13 +10,13 @@ from tmt.methods import METHODS
 from ...core.check import About, Result
 from ...core.rows import Row, column
 from ...core.text import say
-from ...engines import LABELS, Dynamics, Engine, Method, Motion, compared, methods_in
+from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
 from ...judge import run as rules
 from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
 from ...robots.coordinates import rates_at
 from ...robots.file import steps_afforded
-from ..followed import Deviation, check_closest, differences, one_step
+from ..followed import Deviation, Path, check_closest, differences, one_step, path_of
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 # decay rate times dt up to which RK4 is stable: beyond, each stage multiplies the rounding of the one before
@@ -48,21 +47,7 @@ class TrajectoryRow(Row):
     twin_diverged_at: float | None = column("s")
 
 
-class Path(NamedTuple):
-    """The run of one engine at each of its steps."""
-
-    q: np.ndarray  # (steps + 1, nq) rad
-    v: np.ndarray  # (steps + 1, nv)
-    ended: float | None = None  # s: when it diverged
-    left: float | None = None  # s: when it left its start
-
-    @classmethod
-    def of(cls, case: Case, motion: Motion) -> "Path":
-        ended = rules.diverged_at(case, motion.t, motion.q, motion.v)
-        return cls(motion.q, motion.v, ended, rules.departure(motion.t, motion.q, case.coordinates))
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Run:
     """One case by one scheme and step in both engines."""
 
@@ -71,8 +56,9 @@ class Run:
     steps: int
     t: np.ndarray  # (steps + 1,) s
     paths: dict[str, Path]  # by engine, MuJoCo last
-    band: np.ndarray  # (recorded,) of rounding, rad or m
-    integrator: str = ""  # of MuJoCo
+    width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
+    widest: np.ndarray  # (2 nv,): the width of the band from which on it judges no more
+    integrator: str  # of MuJoCo
     judged_until: float = 0.0  # s
 
     @property
@@ -83,6 +69,11 @@ class Run:
     def every(self) -> int:
         """The number of steps from one recorded state to the next."""
         return self.steps // recorded(self.case)
+
+    @property
+    def band(self) -> np.ndarray:
+        """The widest of the positions at each recorded state, rad or m."""
+        return self.width[:, : self.case.coordinates.nv].max(axis=1)
 
     @property
     def ends(self) -> list[float | None]:
@@ -103,18 +94,6 @@ class Run:
         """Values of the run of an engine, (times, n), NaN from where it has diverged."""
         ended = self.paths[engine].ended
         return values if ended is None else np.where((self.t < ended)[:, None], values, np.nan)
-
-
-class Twin(NamedTuple):
-    """The side of TMT, or of a user's own equations: its run, and what MuJoCo's is compared with."""
-
-    run: Run
-    width: np.ndarray  # (recorded, 2 nv): the band of rounding, of movements first
-    widest: np.ndarray  # (2 nv,): the width of the band from which on it judges no more
-    at: np.ndarray  # (states,) s: recorded times from which a single step is compared
-    states: list[np.ndarray]  # q and v at these times
-    stepped: list[np.ndarray]  # q and v one step later
-    step_tolerance: np.ndarray  # (states, 2 nv)
 
 
 @dataclass
@@ -149,28 +128,21 @@ def recorded(case: Case) -> int:
     return count
 
 
-def follow(
-    case: Case, engines: Mapping[str, Engine], finer: Sequence[int], few: Sequence[str] = ()
-) -> TrajectoryResult:
-    """One case with every scheme that both engines have. finer: multiples of the scene's own steps.
-
-    few: MuJoCo's integrators for a scene whose errors are not regular; (): all.
-    """
+def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> TrajectoryResult:
+    """One case with every scheme that both engines have. finer: multiples of the scene's own steps."""
     first, mujoco = case.robot.compared
     result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
     available = {method.scheme for method in methods_in(engines[first], case).values()}
-    chosen = () if "regular" in case.scene.tags else few
     schemes: dict[str, list[Method]] = {}
     for method in methods_in(engines[mujoco], case).values():
-        if method.scheme in available and (not chosen or method.name in chosen):
+        if method.scheme in available:
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides
         for steps in step_counts(case, finer):
             for scheme, methods in schemes.items():
-                stable = stable_part(case, scheme, case.duration / steps)
-                twin = run_of_twin(stable, dynamics[first], steps, scheme)
-                runs = [compare_run(result, twin, dynamics[mujoco], method) for method in methods]
-                if stable is case:
+                part = stable_part(case, scheme, case.duration / steps)
+                runs = compare_scheme(result, part, dynamics, steps, scheme, methods)
+                if part is case:
                     result.runs.append(runs[0])
     return result
 
@@ -188,49 +160,51 @@ def stable_part(case: Case, scheme: str, dt: float) -> Case:
     return case.changed(duration=case.steps / rate, dt=1.0 / rate)
 
 
-def run_of_twin(case: Case, dynamics: Dynamics, steps: int, scheme: str) -> Twin:
-    """TMT's side of a case, or a user's: the run, its band, and single steps from its recorded states."""
+def compare_scheme(
+    result: Result, case: Case, dynamics: Mapping[str, Dynamics], steps: int, scheme: str,
+    methods: Sequence[Method],
+) -> list[Run]:  # fmt: skip
+    """A run of TMT, or of a user's equations, and that of each integrator of MuJoCo with the same scheme.
+
+    Compared are single steps from the recorded states of the first run, each within the rounding of a step,
+    and the runs themselves, within the band, while it is narrow.
+    """
     stepping, tree, tau = METHODS[scheme], case.tree, case.tau
-    dt, every = case.duration / steps, steps // recorded(case)
-    motion = dynamics.run(*case.start, tau, dt, steps, scheme)
-    path = Path.of(case, motion)
+    dt, every, (first, mujoco) = case.duration / steps, steps // recorded(case), dynamics.values()
+    t, path = path_of(case, first, dt, steps, scheme)
     width = band(stepping, tree, path.q, path.v, tau, dt, every, steps_afforded(case.coordinates.nv))
-    alive = motion.t[::every] < ends_first([path.ended])
-    states, times = [values[::every][alive] for values in (path.q, path.v)], motion.t[::every][alive]
-    stepped = one_step(dynamics, states, tau, dt, scheme)
+    widest, at = rules.widest_judged(case, path.q, path.v), t[::every]
+    alive = at < ends_first([path.ended])
+    states = [path.q[::every][alive], path.v[::every][alive]]
+    stepped = one_step(first, states, tau, dt, scheme)
     # the bound of a step's rounding is of first order in dt: too small beyond half a turn of a joint, and
     # where several stages are not stable
     turning = [i for i, unit in enumerate(case.coordinates.units) if unit == "rad"]
     rates = np.maximum(*(np.abs(speeds[:, turning]) for speeds in (states[1], stepped[1])))
-    is_slow = stepping.stages == 1 or dt * max(rates_at(tree, case.q)) <= FASTEST
-    single = is_slow & (dt * rates.max(axis=1, initial=0.0) <= np.pi)
+    is_small = dt * rates.max(axis=1, initial=0.0) <= np.pi
+    is_stable = stepping.stages == 1 or dt * max(rates_at(tree, case.q)) <= FASTEST
+    single = is_stable & is_small
     states, stepped = ([values[single] for values in pair] for pair in (states, stepped))
-    of_positions = width[:, : case.coordinates.nv].max(axis=1)
-    run = Run(case, scheme, steps, motion.t, {case.robot.compared[0]: path}, of_positions)
-    tolerance = step_rounding(stepping, tree, states[0], states[1], tau, dt)
-    widest = rules.widest_judged(case, path.q, path.v)
-    return Twin(run, width, widest, times[single], states, stepped, tolerance)
-
-
-def compare_run(result: Result, twin: Twin, dynamics: Dynamics, method: Method) -> Run:
-    """One side and an integrator of MuJoCo with the same scheme, from the same start with the same step."""
-    case, (run, width, widest, at, states, stepped, step_tolerance) = twin.run.case, twin
-    first, coordinates, times = run.paths[case.robot.compared[0]], case.coordinates, run.t[:: run.every]
-    mujoco = Path.of(case, dynamics.run(*case.start, case.tau, run.dt, run.steps, method.name))
-    run = replace(run, integrator=method.name, paths=run.paths | {"mujoco": mujoco})
-    count = judged(times, width < widest, run.ends)
-    run = replace(run, judged_until=float(times[count - 1]))
-    if len(at):
-        apart = differences(coordinates, stepped, one_step(dynamics, states, case.tau, run.dt, method.name))
-        check_level(result, run, "one step", Deviation(coordinates, at, apart, step_tolerance))
-        if (step_tolerance.min(axis=0) >= widest).any():
-            result.not_judged(run.where, "one step", say(result.finding("wide_step")))
-    last = count * run.every
-    pair = ([path.q[: last : run.every], path.v[: last : run.every]] for path in (first, mujoco))
-    apart = differences(coordinates, *pair)
-    check_level(result, run, "open loop", Deviation(coordinates, times[:count], apart, width[:count]))
-    check_end(result, run)
-    return run
+    rounding = step_rounding(stepping, tree, states[0], states[1], tau, dt)
+    runs = []
+    for method in methods:
+        paths = {case.robot.compared[0]: path, "mujoco": path_of(case, mujoco, dt, steps, method.name)[1]}
+        run = Run(case=case, scheme=scheme, steps=steps, t=t, paths=paths, width=width, widest=widest,
+                  integrator=method.name)  # fmt: skip
+        count = judged(at, width < widest, run.ends)
+        run = replace(run, judged_until=float(at[count - 1]))
+        if single.any():
+            apart = differences(case.coordinates, stepped, one_step(mujoco, states, tau, dt, method.name))
+            steps_apart = Deviation(case.coordinates, at[alive][single], apart, rounding)
+            check_level(result, run, "one step", steps_apart)
+            if (rounding.min(axis=0) >= widest).any():
+                result.not_judged(run.where, "one step", say(result.finding("wide_step")))
+        pair = ([one.q[::every][:count], one.v[::every][:count]] for one in paths.values())
+        apart = differences(case.coordinates, *pair)
+        check_level(result, run, "open loop", Deviation(case.coordinates, at[:count], apart, width[:count]))
+        check_end(result, run)
+        runs.append(run)
+    return runs
 
 
 def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> None:

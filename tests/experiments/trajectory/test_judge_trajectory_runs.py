@@ -1,6 +1,5 @@
 """A scene followed by both engines: each level by its own bound, what is kept, whose number and motion a figure shows."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,10 +13,12 @@ import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
+from compare.experiments.followed import path_of
 from compare.experiments.trajectory import figures_motion_gif as gif
-from compare.experiments.trajectory import figures_runs, motion, runs
+from compare.experiments.trajectory import figures_runs, runs
 from compare.experiments.trajectory.runs import TrajectoryResult
-from compare.judge.run import diverged_at
+from compare.judge.rounding import step_rounding
+from compare.judge.run import diverged_at, widest_judged
 from compare.robots.arm import ARM
 from compare.robots.stick import as_seen, stick_figure
 
@@ -26,97 +27,117 @@ CATCH = CASES["ball catch, free"]  # in which a method of order 1 diverges
 BLUE, ORANGE = (0, 114, 178), (230, 159, 0)
 
 
-def side(case) -> runs.Twin:
-    """TMT's side of a case by RK4 with its own steps."""
-    return runs.run_of_twin(case, Tmt().of(case), case.steps, "rk4")
+def compared(mujoco, case, **edited):
+    """The checks, by quantity, and the run of a case by RK4 with its own steps; edited: functions of `runs`."""
+    result, dynamics = TrajectoryResult("trajectory"), {"tmt": Tmt().of(case), "mujoco": mujoco.of(case)}
+    with pytest.MonkeyPatch.context() as patch, np.errstate(over="ignore", invalid="ignore"):
+        for name, function in edited.items():
+            patch.setattr(runs, name, function)
+        (run,) = runs.compare_scheme(result, case, dynamics, case.steps, "rk4", [METHODS["RK4"]])
+    return {check.quantity: check for check in result.checks}, run
 
 
-def judged_with(mujoco, mine) -> dict:
-    """The checks of a run whose TMT side may be edited, by quantity."""
-    result = TrajectoryResult("trajectory")
-    runs.compare_run(result, mine, mujoco.of(mine.run.case), METHODS["RK4"])
-    return {check.quantity: check for check in result.checks}
+def scaled(function, share):
+    return lambda *arguments: share * function(*arguments)
 
 
-@pytest.mark.parametrize("level, field", [("one step", "step_tolerance"), ("open loop", "width")])
-def test_each_level_uses_its_own_bound_and_no_other(level, field, mujoco):
+def times_of_steps(mujoco, case) -> np.ndarray:
+    """The times from which single steps of a case are compared."""
+    levels = []
+
+    def level(result, run, name, deviation):
+        levels.append((name, deviation.times))
+
+    compared(mujoco, case, check_level=level)
+    return dict(levels).get("one step", np.zeros(0))
+
+
+@pytest.mark.parametrize("level, bound", [("one step", "step_rounding"), ("open loop", "band")])
+def test_each_level_uses_its_own_bound_and_no_other(level, bound, mujoco):
     """In a scene that is judged to its end."""
-    name, damped = f"{level}, TMT to MuJoCo", side(DAMPED)
-    checks = judged_with(mujoco, damped)
+    name, function = f"{level}, TMT to MuJoCo", getattr(runs, bound)
+    checks, run = compared(mujoco, DAMPED)
+    assert np.array_equal(times_of_steps(mujoco, DAMPED), run.t)
     used = checks[name].over_tolerance
     assert all(check.passed for check in checks.values()) and 1e-5 < used < 1.0
-    assert checks[name].tolerance in getattr(damped, field) and np.array_equal(damped.at, damped.run.t)
     for more, passes in ((1.01, True), (0.99, False)):
-        tight = judged_with(mujoco, damped._replace(**{field: more * used * getattr(damped, field)}))
+        tight, _ = compared(mujoco, DAMPED, **{bound: scaled(function, more * used)})
         assert [quantity for quantity, check in tight.items() if not check.passed] == [name] * (not passes)
 
 
 def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
-    damped = side(DAMPED)
-    path, name = damped.run.paths["tmt"], "open loop, TMT to MuJoCo"
+    name, (_, damped) = "open loop, TMT to MuJoCo", compared(mujoco, DAMPED)
     for share, passes in ((0.9, True), (1.1, False)):
-        q = path.q.copy()
-        q[-1] += share * damped.width[-1, :3]
-        edited = damped._replace(run=replace(damped.run, paths={"tmt": path._replace(q=q)}))
-        assert judged_with(mujoco, edited)[name].passed is passes
+
+        def moved(case, dynamics, dt, steps, method, share=share):
+            t, path = path_of(case, dynamics, dt, steps, method)
+            q = path.q.copy()
+            q[-1] += share * damped.width[-1, :3] * (method == "RK4")
+            return t, path._replace(q=q)
+
+        checks, _ = compared(mujoco, DAMPED, path_of=moved)
+        assert checks[name].passed is passes
 
 
 def test_a_step_whose_bound_is_wider_than_what_moves_is_not_judged(mujoco):
-    damped = side(DAMPED)
+    steps = []
+    compared(mujoco, DAMPED, step_rounding=lambda *of: steps.append(step_rounding(*of)) or steps[0])
     for more, is_judged in ((1.01, True), (1.0, False)):
-        widest = np.append(damped.widest[:-1], more * damped.step_tolerance[:, -1].min())
-        assert ("one step" not in judged_with(mujoco, damped._replace(widest=widest))) is is_judged
+
+        def widest(*run, more=more):
+            return np.append(widest_judged(*run)[:-1], more * steps[0][:, -1].min())
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(runs.rules, "widest_judged", widest)
+            checks, _ = compared(mujoco, DAMPED)
+        assert ("one step" not in checks) is is_judged
 
 
 @pytest.mark.parametrize("rate", [100.0, 202.0])
 def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
-    mine = side(case)
-    path = mine.run.paths["tmt"]
-    alive, v = mine.run.t < (np.inf if path.ended is None else path.ended), np.abs(path.v)
+    checks, run = compared(mujoco, case)
+    path, at = run.paths["tmt"], times_of_steps(mujoco, case)
+    alive, v = run.t < (np.inf if path.ended is None else path.ended), np.abs(path.v)
     following = np.append(v[1:].max(axis=1), 0.0)  # within each step: at its end
     slow = np.maximum(v.max(axis=1), following)[alive] / 64 <= np.pi
-    assert np.array_equal(mine.at, mine.run.t[alive][slow]) and slow[0] == (rate < 201.1)
-    assert ("one step, TMT to MuJoCo" in judged_with(mujoco, mine)) == slow.any()
+    assert np.array_equal(at, run.t[alive][slow]) and slow[0] == (rate < 201.1)
+    assert ("one step, TMT to MuJoCo" in checks) == slow.any()
 
 
 def test_a_step_that_ends_faster_than_half_a_turn_is_not_compared_alone(mujoco):
     """From rest the arm falls; in a step of 10 s RK4 turns it far."""
     far = FREE.changed(duration=20.0, dt=10.0, judged=0.0, tags=("own",))
-    mine = side(far)
-    assert 0.0 not in mine.at and 0.0 in side(FREE).at
-    assert [name for name, check in judged_with(mujoco, mine).items() if not check.judged] == ["open loop"]
+    assert 0.0 not in times_of_steps(mujoco, far) and 0.0 in times_of_steps(mujoco, FREE)
+    checks, _ = compared(mujoco, far)
+    assert [name for name, check in checks.items() if not check.judged] == ["open loop"]
 
 
 @pytest.mark.parametrize("judged, passes", [(3.04, True), (3.05, False)])
 def test_the_time_that_is_judged_is_at_least_what_the_scene_asks_for(judged, passes, mujoco):
-    case = HELD.changed(judged=judged)
-    checks = judged_with(mujoco, side(case))
+    checks, _ = compared(mujoco, HELD.changed(judged=judged))
     of_time = checks["time judged"]
     assert (of_time.value, of_time.passed, of_time.judged) == (3.046875 if passes else None, passes, passes)
 
 
 def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
     case = DAMPED.changed(judged=0.0, damping=0.0, tags=("own",))
-    assert judged_with(mujoco, side(case)).keys() == LEVELS
-    assert judged_with(mujoco, side(FREE)).keys() == LEVELS | {"time judged", "movement"}
+    assert compared(mujoco, case)[0].keys() == LEVELS
+    assert compared(mujoco, FREE)[0].keys() == LEVELS | {"time judged", "movement"}
     still = parse(XML.replace("0 0 -9.81", "0 0 0"), tmt.ARM)
-    assert judged_with(still, side(FREE))["movement"].value == 0.0  # one side stays: it tests nothing
+    assert compared(still, FREE)[0]["movement"].value == 0.0  # one side stays: it tests nothing
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
     moon = parse(MOON, tmt.ARM)
-    mine, result = side(HELD), TrajectoryResult("trajectory")
-    run = runs.compare_run(result, mine, moon.of(HELD), METHODS["RK4"])
+    _, run = compared(moon, HELD)
     motion = moon.of(HELD).run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")
     (ours, theirs), ended = run.paths.values(), diverged_at(HELD, motion.t, motion.q, motion.v)
-    assert [*run.paths] == ["tmt", "mujoco"] and ours is mine.run.paths["tmt"]
-    assert (ours.ended, ours.left) == (None, None)
+    assert [*run.paths] == ["tmt", "mujoco"] and (ours.ended, ours.left) == (None, None)
     for values, expected in ((theirs.q, motion.q), (theirs.v, motion.v)):
         assert np.array_equal(values, expected, equal_nan=True)
     assert (theirs.ended, theirs.left) == (ended, 5 / 64)
-    assert {row.diverged_at for row in result.rows} == {ended}
 
 
 LIGHT = """<mujoco><worldbody><body><joint name="arm" axis="0 1 0" damping="0.1"/><geom size="0.1" pos="0.3 0 0"/>
@@ -137,6 +158,18 @@ def test_a_scheme_that_does_not_bear_the_step_of_a_file_is_compared_in_the_begin
         assert (row.dt, row.judged_until / 64) == (dt, dt)
     assert {run.scheme for run in result.runs} == {"semi_implicit_euler", "implicit"}
     assert {row.engine_integrator for row in result.of_beginnings} == {"RK4"} and stated.of_beginnings == []
+
+
+@pytest.mark.parametrize("share, is_whole", [(0.99, True), (1.01, False)])
+def test_only_the_beginning_is_compared_where_the_fastest_rate_times_the_step_exceeds_2(share, is_whole):
+    """A pendulum alone decays at damping / inertia: of RK4, to which damping is explicit."""
+    damping = share * 2.0 * 64.0 * 2.0  # of 2 kg m2, at dt = 1/64 s
+    text = f"""<mujoco><worldbody><body><joint name="arm" axis="0 1 0" damping="{damping!r}"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="2 2 2"/></body></worldbody></mujoco>"""
+    case = setup_of_file(text).robot.case("c", duration=1.0, dt=1 / 64, tags=("own",))
+    part = runs.stable_part(case, "rk4", 1 / 64)
+    assert (part is case) is is_whole and runs.stable_part(case, "semi_implicit_euler", 1 / 64) is case
+    assert part.duration == pytest.approx(1.0 if is_whole else 64 / (share * 128.0))
 
 
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
@@ -180,8 +213,8 @@ def followed(engines):
 
 @pytest.fixture(scope="module")
 def drawn(followed):
-    (run,) = motion.drawn_runs(ARM, followed)
-    return motion.pictures_of(run)
+    (run,) = gif.drawn_runs(ARM, followed)
+    return gif.pictures_of(run)
 
 
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():

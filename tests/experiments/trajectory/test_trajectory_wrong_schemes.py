@@ -11,7 +11,7 @@ from models import PATHS
 from trajectory_curves import CASES
 
 from compare.engines.own import Own
-from compare.experiments.trajectory import within_time
+from compare.experiments.trajectory import cases_left_out
 from compare.experiments.trajectory.runs import follow
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
@@ -95,10 +95,12 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
     assert found == {(integrator, level) for level in STEPS}
 
 
-def test_equations_of_ones_own_have_no_servos(gripper):
-    own = Own(SimpleNamespace(has=lambda name: True, times={"acceleration": (1e-6,)}))
-    cases, setup = gripper[0].robot.cases, SimpleNamespace(engines={"own": own}, size="full")
-    able, said = within_time(setup, cases)
-    assert [case.name for case in able] == ["open, held", "open, let go", "open, let go, damped"]
-    assert len(said) == 1
-    assert own.methods_in(cases[-1]) == {} and own.methods_in(able[0])
+@pytest.mark.parametrize("seconds, left_out", [(1e-6, []), (2.0, ["open, let go", "open, let go, damped"])])
+def test_equations_of_ones_own_have_no_servos_and_follow_what_there_is_time_for(seconds, left_out, gripper):
+    equations = SimpleNamespace(has=lambda name: True, times={"acceleration": (seconds * 1e-2,)})
+    own, cases = Own(equations), gripper[0].robot.cases
+    found = cases_left_out(SimpleNamespace(own=own, size="full"), cases)
+    servos = [case.name for case in cases if case.controller]
+    assert [name for name, taken in found.items() if taken is None] == servos
+    assert [name for name, taken in found.items() if taken] == left_out
+    assert own.methods_in(cases[-1]) == {} and own.methods_in(cases[0])

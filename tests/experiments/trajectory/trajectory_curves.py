@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from compare.experiments.trajectory.runs import Path, Run
+from compare.experiments.followed import Path
+from compare.experiments.trajectory.runs import Run
 from compare.robots.arm import ARM
 
 NEVER = (None, None)  # of both engines
@@ -16,4 +17,8 @@ def run_of(case, ours=0.0, theirs=0.0, left=NEVER, ended=NEVER, scheme="rk4", st
     mine = Path(case.q + ours * ramp, 10.0 + ours * ramp, ended[0], left[0])
     other = Path(case.q + theirs * ramp, 20.0 + theirs * ramp, ended[1], left[1])
     paths = {"tmt": mine, "mujoco": other}
-    return Run(case, scheme, steps, np.linspace(0.0, 5.0, 65), paths, np.full(65, 1e-9), "RK4", until)
+    nv = case.coordinates.nv
+    return Run(
+        case=case, scheme=scheme, steps=steps, t=np.linspace(0.0, 5.0, 65), paths=paths, integrator="RK4",
+        width=np.full((65, 2 * nv), 1e-9), widest=np.full(2 * nv, 1e-3), judged_until=until,
+    )  # fmt: skip

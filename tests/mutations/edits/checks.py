@@ -10,7 +10,7 @@ CHECKS = (
     ("conclusions", "check_smallest_errors", "quantity"),
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("followed", "check_closest", "quantity"),
-    ("trajectory.errors", "check_order", "name"), ("stability.limits", "check_limits", "what"),
+    ("stability.limits", "check_limits", "what"),
     ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
     ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
     ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),

@@ -1,4 +1,4 @@
-"""Edits of how runs are compared: bands of rounding, divergence, drift, smaller models, motions that are known."""
+"""Edits of how runs are compared: bands of rounding, divergence, smaller models, motions that are known."""
 
 EDITS = (
     ("rounding", "NARROW", "1e-3", "0.1", "runs are judged up to 0.1 rad"),
@@ -13,8 +13,8 @@ EDITS = (
     ("rounding", "slope_rounding", "_1 < 4.0 * LEFT_OUT", "False", "discrete leaves out no force"),
     ("scale", "gain_scale", "np.abs(q)", "0.0 * np.abs(q)", "what servos feed back of positions is not rounded"),
     ("scale", "gain_scale", "np.abs(qd)", "30 * np.abs(qd)", "what servos feed back of speeds is rounded x 30"),
-    ("trajectory.runs", "compare_run", "(_1 >= widest).any()", "False", "a step's bound may be wider than what moves"),
-    ("trajectory.runs", "run_of_twin", "(states[1], _1)", "(states[1], states[1])", "what ends far off is compared"),
+    ("trajectory.runs", "compare_scheme", "(_1 >= widest).any()", "False", "a step's bound may be wider than what moves"),
+    ("trajectory.runs", "compare_scheme", "(states[1], _1)", "(states[1], states[1])", "what ends far off is compared"),
     ("trajectory.runs", "check_end", "alive or is_known or run.required", "True", "a run of a start alone passes"),
     ("run", "exchanged", "pull @ give @ pull / 2.0", "3 * pull @ give @ pull / 2.0", "the energy of servos x 3"),
     ("run", "exchanged", "case.tau - fed_back_at(*_1)", "case.tau + fed_back_at(*_1)", "servos push the other way"),
@@ -36,14 +36,18 @@ EDITS = (
     ("order", "ORDER_MARGIN", "0.15", "3", "orders may be off by 3"),
     ("run", "MOVES", "0.1", "0.001", "a run that hardly moves is enough"),
     ("trajectory", "check_divergence", "run.band[_1] < NARROW", "False", "the step of divergence is never compared"),
-    ("trajectory.runs", "run_of_twin", "_1[::every] < _2", "_0 & (_1[::every] < case.duration / 2)", "half is lost"),
+    ("trajectory.runs", "compare_scheme", "at < _1", "_0 & (at < case.duration / 2)", "half is lost"),
+    ("trajectory.runs", "stable_part", "rate * dt <= BEARABLE", "False", "a scene is judged in its beginning only"),
+    ("trajectory.runs", "check_end", "check_divergence(result, run)", "False", "both diverge, and nothing is checked"),
+    ("trajectory", "headline", "any(check.failed for check in result.checks)", "False", "the share beside a failure"),
+    ("run", "diverged_at", "~(energy - energy[0] <= exchanged(case, q, done))",
+     "energy - energy[0] > exchanged(case, q, done)", "an energy that is not a number is possible"),
+    ("check", "largest_known", "np.isnan(known).any()", "False", "the largest of 1 and no number is 1"),
     ("followed", "check_closest", "closest(_1, _2)", "(0, 0)", "the first state is judged"),
     ("followed", "check_closest", "closest(_1, _2)", "closest(_1[: max(1, len(_1) - 1)], _2[: max(1, len(_2) - 1)])",
      "the last state is not judged"),
     ("trajectory", "check_end", "min(_1 for q in _2)", "max(_1 for q in _2)", "it is enough that one run moves"),
     ("trajectory", "check_level", "movements.max()", "movements.min()", "the least difference is the largest"),
-    ("trajectory.errors", "check_order", "finer <= _1", "True", "every drift is rounding"),
-    ("trajectory.errors", "drift_of", "energy - energy[0]", "0.0 * energy", "no energy is lost"),
     ("smallest", "ZERO", "mpmath.mpf(10) ** _1", "mpmath.mpf(10)", "an acceleration below 10 rad/s2 is zero"),
     ("reduction.search", "groups_of", "use.ranges[name] <= _1", "True", "what the motion is about may be locked"),
     ("reduction.search", "Locks.within", "self.error(chosen | {group}) <= allowed", "True", "any joint more may be locked"),

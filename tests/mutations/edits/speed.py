@@ -23,6 +23,7 @@ EDITS = (
     ("judge.order", "LEAST_ORDER", "7.0", "1.0", "order 8 need only be 1"),
     ("judge.order", "check_order", "abs(measured - twin)", "0.0", "a higher order than tmt's passes"),
     ("judge.order", "check_order", "nominal - measured", "0.0", "an order that is too low passes"),
+    ("truth.reference", "in_doubles", "qd - before[1]", "0.0 * qd", "a run in doubles is as accurate as its positions"),
     ("truth.reference", "coarsest_steps", "RECORDS if case.controller else _1", "_1", "steps of a step response begin fine"),
     ("conclusions", "check_same_schemes", "max(FACTOR, _1)", "1e6", "the same scheme: 64 -> 1e6"),
     ("conclusions", "check_smallest_errors", "FACTOR * scene.floor", "100 * FACTOR * scene.floor", "tolerance x 100"),
