@@ -83,7 +83,7 @@ def equations(
     Examples
     --------
     >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
-    return out.reshape(*batch, 3)
+    return out.reshape([*batch, 3])
     """
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
