@@ -117,7 +117,7 @@ def expansion() -> Code:
         with code.when(when(ROOT).bits("and", at_first)):
             put(*root(ah, al))
         with code.when(when(SIGN).bits("and", at_first)):  # all later coefficients are zero
-            put(ah.compare("lt", 0.0).choose(code.number(-1.0), 1.0), 0.0)
+            put(ah.compare("lt", 0.0).choose(code.number(-1.0), 1.0), code.number(0.0))
         with code.when(when(SINE, COSINE).bits("and", at_first)):
             code.call("sincos", both, ah, al)
             place = when(SINE).choose(code.number(0, INDEX), 2)
