@@ -164,8 +164,8 @@ def test_derivatives_of_accelerations_go_through_the_inverse():
     by_q, by_qd = (part[0] for part in alone.force_rates(sizes))
     found = alone.derivatives(1.0, qdd[None], by)
     assert np.allclose(found[3][0], by_q, rtol=1e-12) and np.allclose(found[4][0], by_qd, rtol=1e-12)
-    for scale, right, slope in zip(found[:3], (by_q, by_qd, np.eye(6)), by[:3]):
-        assert np.allclose(scale[0], inverse @ (right + factored @ np.abs(slope[0])), rtol=1e-12)
+    for size, right, slope in zip(found[:3], (by_q, by_qd, np.eye(6)), by[:3]):
+        assert np.allclose(size[0], inverse @ (right + factored @ np.abs(slope[0])), rtol=1e-12)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.1])
