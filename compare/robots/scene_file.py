@@ -16,6 +16,7 @@ KEYS = (
     "name", "posture", "q", "speed", "torque", "targets", "gravity", "damping", "locked", "duration", "dt"
 )  # fmt: skip
 STEPS = 64  # of a scene without dt
+MOST_STEPS = 100_000  # of recorded controls: minutes for one answer
 LONGEST = 56  # text of a value in a message
 NEARLY_ONE = 1e-3  # accepted deviation of the length of a quaternion from 1, for few digits
 
@@ -51,25 +52,54 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
     return tuple(scenes)
 
 
-def read_controls(path: str | Path, actuators: Sequence[str]) -> dict[str, np.ndarray]:
-    """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators. SceneError."""
+def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict[str, np.ndarray]:
+    """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators.
+
+    dt: s, the step of the file, of which the times may be MOST_STEPS. SceneError, in one line with the column or
+    the row, for what is no table of such numbers.
+    """
+    if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
+        raise SceneError(f"cannot read the controls of {path}: it is not a regular file")
     try:
-        with open(path, encoding="utf-8", newline="") as file:
-            names, *lines = [line for line in csv.reader(file) if line]
-        table = np.array(lines, dtype=float).reshape(-1, len(names)).T
-    except (OSError, ValueError) as error:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            lines = [line for line in csv.reader(file) if any(cell.strip() for cell in line)]
+    except (OSError, ValueError, csv.Error) as error:
         raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
-    columns = dict(zip(names, table))
-    if unknown := [name for name in names if name not in ("time", *actuators)]:
+    names, rows = [name.strip() for name in lines[0]] if lines else [], lines[1:]
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            raise SceneError(f"{path}: the column {shown(name)} is there twice")
+        if name not in ("time", *actuators):
+            known = f"time and {', '.join(actuators)}"
+            raise SceneError(f"{path}: there is no actuator {name}; expected {known}")
+    if "time" not in names or len(names) < 2 or not rows:
+        raise SceneError(f"{path}: expected a column time, one of at least one actuator, and rows of numbers")
+    table = np.zeros((len(rows), len(names)))
+    for number, row in enumerate(rows):
+        where = f"{path}, row {number + 1}"
+        if len(row) != len(names):
+            raise SceneError(f"{where}: {len(row)} cells; expected {len(names)}")
+        for column, cell in enumerate(row):
+            try:
+                table[number, column] = float(cell)
+            except ValueError:
+                table[number, column] = np.nan
+            if not np.isfinite(table[number, column]):
+                raise SceneError(f"{where}: {names[column]} is {shown(cell)}; expected a number")
+    columns = dict(zip(names, table.T))
+    times = columns["time"]
+    if times[0] != 0.0 or len(times) < 2:
         raise SceneError(
-            f"{path}: there is no actuator {unknown[0]}; expected time and {', '.join(actuators)}"
+            f"{path}: time begins at {times[0]:g}, {len(times)} rows; expected two rows at least, from 0 on"
         )
-    times = columns.get("time", np.zeros(0))
-    rises = len(times) > 1 and times[0] == 0.0 and bool((np.diff(times) > 0.0).all())
-    if not (rises and len(columns) > 1 and np.isfinite(table).all()):
+    falls = np.flatnonzero(np.diff(times) <= 0.0)
+    if len(falls):
         raise SceneError(
-            f"{path}: expected a column time that rises from 0, and numbers of at least one actuator"
+            f"{path}, row {falls[0] + 2}: time does not rise ({times[falls[0] + 1]:g} after {times[falls[0]]:g} s)"
         )
+    if times[-1] / dt > MOST_STEPS:
+        steps = f"{times[-1] / dt:.2g} steps of {1e3 * dt:g} ms; expected {MOST_STEPS} at most"
+        raise SceneError(f"{path}: time ends at {times[-1]:g} s, which are {steps}")
     return columns
 
 

@@ -123,7 +123,15 @@ class Run:
     def too_long(self, name: str) -> str:
         """Why an experiment is left out of a quick run of several; "" if it is not."""
         most, robot = EXPERIMENTS[name].quick_speeds, self.setup.robot
-        if most is None or robot.coordinates.nv <= most or not self.setup.is_quick or self.setup.alone:
+        fields = [option.removeprefix("--").replace("-", "_") for option in EXPERIMENTS[name].options]
+        is_asked = any(getattr(self.setup.request, field, None) for field in fields)
+        if (
+            most is None
+            or robot.coordinates.nv <= most
+            or not self.setup.is_quick
+            or self.setup.alone
+            or is_asked
+        ):
             return ""
         return block("run", "not_quick", name=name, most=most)
 

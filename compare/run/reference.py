@@ -19,6 +19,7 @@ from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import aside, own_object, raised_in
 from ..experiments.setup import Request
 from ..robots import Robot
+from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import not_compared, robot_of, robot_of_solution
@@ -103,15 +104,16 @@ class Compared(NamedTuple):
         if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
             raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
         if asked["controls"]:
-            names = self.reading.drive.names if self.reading.drive else ()
-            asked["controls"] = read_controls(asked["controls"], names)
+            names = [actuator.name for actuator in self.reading.drive.actuators]
+            asked["controls"] = read_controls(asked["controls"], names, of_step)
             if options.scenes:
                 raise ModelError("--controls and --scenes both say what the robot does")
         if asked["write"] is not None:
-            from ..experiments.reduction.written import needed_of, refusal  # imports are slow
+            from ..experiments.reduction.written import refusal  # imports are slow
 
             other = [Source(Path(options.reference))] if is_solution(options.reference or "") else []
-            path, needed = Path(asked["write"]).absolute(), needed_of(self.reading.source, *other)
+            path = Path(asked["write"]).absolute()
+            needed = [file for source in (self.reading.source, *other) for file in source.files]
             if why := refusal(path, needed, Path(options.out)):
                 raise ModelError(f"cannot write {asked['write']}: {why}")
             asked["write"] = str(path)
@@ -163,7 +165,7 @@ def with_solution(source: Source, shown: str, asked: str, solution: str) -> Comp
     placement = placed(replace(stated.tree, joint_names=names), reading.tree)
     otherwise = placement.remarks() + of_welded(source) + not_compared(reading, stated, names)
     # its actuators do not act: those of the file may differ
-    stated = replace(stated, tree=placement.tree, drive=None)
+    stated = replace(stated, tree=placement.tree, drive=Drive())
     robot = robot_of_solution(reading, shown, stated, name)
     reference = reference._replace(source=name, renamed=renamed, otherwise=tuple(map(say, otherwise)))
     return Compared(reference, robot, engine(reading, stated), reading)

@@ -1,4 +1,4 @@
-"""Runs that errors are measured against: their digits, what is too stiff for a series; which joints a motion needs."""
+"""Runs that errors are measured against: their digits, what is too stiff for a series."""
 
 from dataclasses import replace
 
@@ -11,7 +11,6 @@ from compare.experiments.speed.runs import floor
 from compare.experiments.speed.settings import scenes_of
 from compare.robots.arm import ARM
 from compare.truth import reference
-from compare.truth.smallest import needed
 from tmt.exact import motion as reference_run
 
 BENT = next(case for case in scenes_of(ARM) if case.name == "bent, free")
@@ -92,24 +91,3 @@ def test_a_run_ends_where_it_would_take_too_many_steps(monkeypatch):
     monkeypatch.setattr(reference_run, "MOST_OPERATIONS", (steps - 1) * work)
     with pytest.raises(reference_run.TooManySteps, match=rf"\b{steps - 1}\b"):
         run()
-
-
-KNOWN = {"zero, free": ("beta",), "ball catch, held": ARM.joints, "bent, held": ARM.joints}
-SCENES = {  # what is not needed, and the scene
-    "in its plane": (("beta",), {"posture": (20, 0, 40), "speed": (30, 0, -50)}),
-    "out of it by 1e-6 deg": ((), {"posture": (20, 1e-6, 40)}),
-    "sin of the double nearest to pi is not 0": ((), {"posture": (20, 180, 40)}),
-    "plane of a locked alpha": (("beta",), {"posture": (30, 0, 0), "locked": ("alpha",)}),
-    "at rest without gravity": (ARM.joints, {"posture": "bent", "gravity": False}),
-    "the rounded torque does not hold": (("beta",), {"posture": "zero", "torque": (-2.20725, 0, -2.20725)}),
-}
-
-
-def test_what_is_not_needed():
-    for case in ARM.cases:
-        assert needed(case).stays == KNOWN.get(case.name, ()), case.name
-
-
-@pytest.mark.parametrize("stays, scene", SCENES.values(), ids=SCENES)
-def test_what_is_not_needed_in_a_scene(stays, scene):
-    assert needed(ARM.case("a scene", **scene)).stays == stays

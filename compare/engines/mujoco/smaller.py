@@ -14,8 +14,8 @@ from tmt.export.parameters import PAYLOAD, SIZES, Parameters
 from tmt.model.tree import Tree
 
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
-from .motion import Motion, Use, joints
-from .names import INTEGRATORS, bit, element_name, kind_of, parts_of
+from .motion import Use, joints
+from .names import bit, element_name, kind_of, parts_of
 from .source import Source, delete_textures, is_from_geoms, without_visuals
 from .variants import of_base
 
@@ -99,6 +99,13 @@ def assets_of(path: File) -> File:
     return path.with_name(f"{path.stem}_assets")
 
 
+def is_written(path: File) -> bool:
+    """Whether `Smaller.write` wrote a file: a comment in its first line says so."""
+    with open(path, "rb") as file:
+        first = file.readline(1000)
+    return path.suffix == ".xml" and first.startswith(b"<!--") and MARK.encode() in first
+
+
 def drawing(small: Smaller, use: Use) -> int:
     """What is only drawn: lights, cameras, textures, skins, geoms that collide with nothing, meshes."""
     count = delete_textures(small.spec) + sum(small.delete(elements, lambda _: True) for elements in DRAWN)
@@ -152,14 +159,6 @@ def stages(small: Smaller, use: Use) -> int:
     return bin(before[0] ^ option.disableflags).count("1") + bin(before[1] ^ option.enableflags).count("1")
 
 
-def islands(small: Smaller, use: Use) -> int:
-    """The division of constraints into islands, of which one alone gives the same bits."""
-    option, before = small.spec.option, small.spec.option.disableflags
-    if use.has_constraints:
-        option.disableflags |= bit("ISLAND")
-    return int(before != option.disableflags)
-
-
 def without(elements: str, is_needless: Callable[[Any, Use], bool]) -> "Edit":
     return lambda small, use: small.delete(elements, lambda element: is_needless(element, use))
 
@@ -178,7 +177,6 @@ FREE: dict[str, Edit] = {
     "tendons without force": tendons,
     "limits that never act": limits,
     "stages without work": stages,
-    "division into islands": islands,
 }
 
 
@@ -235,17 +233,15 @@ def of_parts(model: mujoco.MjModel, positions: Mapping[str, np.ndarray]) -> Posi
     return at
 
 
-def finished(small: Smaller, motions: Iterable[Motion], dt: float, integrator: str) -> Smaller:
-    """With a step and an integrator, and the starts of the motions as its only keyframes."""
+def finished(small: Smaller, starts: Iterable[tuple[str, mujoco.MjData]]) -> Smaller:
+    """With starts of motions as its only keyframes, by their names."""
     spec = small.spec.copy()
-    spec.option.timestep, spec.option.integrator = dt, INTEGRATORS[integrator]
     for key in list(spec.keys):
         spec.delete(key)
-    for motion in motions:
-        data = motion.placed(small.model)
+    for name, data in starts:
         places = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()}
         state = {"qpos": data.qpos, "qvel": data.qvel, "act": data.act, "ctrl": data.ctrl}
-        spec.add_key(name=motion.name, **state, **places)
+        spec.add_key(name=name, time=data.time, **state, **places)
     return Smaller(spec)
 
 

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from ...process.parts import is_pipe, named_by
+from ...process.parts import is_pipe, named_by, needed_by
 from . import locked
 from .locked import FROM_GEOMS, Positions, compiled, gives_inertia
 from .names import FROM_4, moving
@@ -158,6 +158,14 @@ class Source:
         if not self.spec.compiler.settotalmass > 0.0:  # of which bodies that never move have a part
             locked.delete_meshes(bare)
         return bare
+
+    @property
+    def files(self) -> list[Path]:
+        """The existing files of the model: itself, and those that it includes, attaches and loads."""
+        if not isinstance(self.origin, Path) or self.spec is None:
+            return []
+        meshes = (Path(self.origin.parent, mesh.file) for mesh in self.spec.meshes)  # package:// too
+        return [*needed_by(self.origin), *filter(Path.is_file, meshes)]
 
     def joined(self) -> "Source":
         """The same, with the mass of bodies that are welded to a moving one in that one."""

@@ -1,73 +1,197 @@
-"""What each scene needs of the model: joints that can be locked with the same motion."""
+"""What does a motion not need: elements that never act, for nothing, and joints, for an error that is allowed?"""
 
-from collections.abc import Iterator, Mapping
+import time
+from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Any, cast
 
-from tmt.exact.tree import DIGITS
+import numpy as np
 
-from ...core.check import Result
-from ...judge.scale import FACTOR
+import tmt
+from tmt import Tree
+
+from ...core.check import About, Result
+from ...core.text import block
+from ...core.timing import fastest
+from ...engines.mujoco import Mujoco
+from ...engines.mujoco.motion import Scene
+from ...engines.mujoco.reading import Reading, read
+from ...engines.mujoco.smaller import Smaller, assets_of, files_of, of_parts
+from ...judge.agree import closest, worst_of_each
+from ...judge.entries import Entries
+from ...judge.run import movement_unit
+from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...robots.case import Case
-from ...truth.smallest import Needed, needed
+from ...robots.case import SEED
+from ...robots.coordinates import Coordinates
 from .. import Experiment
 from ..setup import Setup
-from . import of_file
-from .records import NeedRow
+from .records import JointRow, ModelRow, UseRow
+from .scene import scene_of, scene_of_case
+from .search import TEXT, Locks, lockable, take_out
+from .written import draft_of, move, written
 
 EXPERIMENT = Experiment(
     order=110,
     serves_own=False,
-    first_screen=("answer",),
+    first_screen=("answer", "needs"),
+    quick_speeds=8,
     options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
 )
+ERROR = 1e-3  # rad or m, if none is asked for
+STATES = 5  # random ones, at which the locked models are compared
+ROUNDS = 6  # of timing
 
 
-def claim_values(robot: Robot) -> dict[str, str | float]:
-    joint = "hinge" if set(robot.coordinates.all_kinds) == {"hinge"} else "joint"
-    return {"joint": joint, "digits": DIGITS, "eps": FACTOR}
+def claim_values(robot: Robot) -> dict[str, float]:
+    return {"error": ERROR, "eps": FACTOR}
 
 
 def rows(setup: Setup) -> Result:
     """What the motion of a file, or each scene of the arm, needs."""
-    result, robot, needs = Result("reduction"), setup.robot, dict[Case, Needed]()
-    if driven := [case.name for case in robot.cases if case.controller and not robot.is_read]:
-        result.find("driven", scenes=driven)
-    for case in robot.cases_of_torque:
-        if not robot.is_read:
-            needs[case] = needed(case)
-    if setup.reading and not robot.is_stated and is_asked(setup):
-        of_file.add(result, setup, setup.reading)
-    add_needs(result, needs)
+    result = Result("reduction")
+    if setup.reading:
+        add_file(result, setup, setup.reading)
+    elif not setup.robot.is_read:
+        add_scenes(result, setup)
     return result
 
 
-def is_asked(setup: Setup) -> bool:
-    """Whether a run answers what a motion of the file needs: alone, in full, or with an option of it."""
-    request = setup.request
-    given = request.error, request.points, request.controls, request.write
-    return setup.alone or setup.size == "full" or any(option is not None for option in given)
+def add_scenes(result: Result, setup: Setup) -> None:
+    """The joints that each scene of the arm needs; a finding for equal scenes, those with joints to lock last."""
+    source, rows = cast(Mujoco, setup.engines["mujoco"]).source, list[JointRow]()
+    groups: dict[tuple[tuple[str, ...], ...], list[str]] = {}
+    if driven := [case.name for case in setup.robot.cases if case.controller]:
+        result.find("driven", scenes=driven)
+    for case in setup.robot.cases_of_torque:
+        scene = scene_of_case(case, source)
+        locks = lockable(scene, scene.whole, ERROR)
+        needed = tuple(row.joint for row in locks.rows if row.why_needed)
+        stays = tuple(row.joint for row in locks.rows if not row.why_needed)
+        groups.setdefault((needed, case.scene.locked, stays), []).append(case.name)
+        rows += locks.rows
+        if locks.names:
+            add_checks(result, scene, locks, locks.models[-1][2], ERROR)
+    locks_last = sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2]))
+    for (needed, locked, stays), scenes in locks_last:
+        found = result.finding("needs", scenes=scenes, needed=needed, locked=locked, stays=stays)
+        result.top.append(found)
+    result.tables["reduction_joints"] = rows
 
 
-def add_needs(result: Result, needs: Mapping[Case, Needed]) -> None:
-    """What scenes need: a row for each joint, a finding for equal scenes; joints to lock come last."""
-    groups: dict[tuple[tuple[str, ...], ...], list[Case]] = {}
-    for case, need in needs.items():
-        names = tuple(name for name in case.joints if name in need.moves)
-        rows = [NeedRow(case.name, name, need.moves[name]) for name in names]
-        result.tables.setdefault("reduction_needs", []).extend(rows)
-        groups.setdefault((names, case.scene.locked, need.stays), []).append(case)
-    for numbers, cases in sorted(groups.items(), key=lambda group: bool(group[0][0] and group[0][2])):
-        about, scenes = claim_values(cases[0].robot), [case.name for case in cases]
-        moving, locked, stays = numbers
+def add_file(result: Result, setup: Setup, reading: Reading) -> None:
+    """Rows, checks and the answer of a motion of a file; the smaller file is written."""
+    allowed, write = setup.request.error or ERROR, setup.request.write
+    try:
+        scene = scene_of(setup, reading)
+    except ValueError as reason:
+        result.not_judged("", "a motion with fewer joints", str(reason), about=About.PROGRAM)
+        return
+    if not scene.is_finite:
         result.top.append(
-            result.finding("answer", scenes=scenes, needed=moving, locked=locked, stays=stays, about=about)
+            result.finding("unstable", scene=scene.name, dt=reading.dt, integrator=reading.integrator)
         )
+        result.not_judged(
+            scene.name, "a motion with fewer joints", "the file's own run fails", about=About.STEP
+        )
+        return
+    free, small = take_out(scene)
+    locks = lockable(scene, small, allowed)
+    about = {
+        "source": str(reading.source),
+        "scene": scene.name,
+        "duration": scene.duration,
+        "allowed": allowed,
+    }
+    with draft_of(Path(write) if write else None) as draft:
+        while True:  # until an error that six digits make is allowed, too
+            names, model, _ = locks.models[-1]
+            comment = block(TEXT, "comment", about=about, names=names, command=setup.command)
+            error = scene.error(written(scene, model, draft, comment), from_keys=True)
+            if error <= allowed or not names:
+                break
+            locks.models.pop()
+        if not (names or write):
+            error = 0.0  # without six digits
+        add_checks(result, scene, locks, error, allowed)
+        is_written = bool(write) and all(check.passed for check in result.checks)
+        if write and is_written:
+            move(draft, Path(write))
+    for row in locks.rows:
+        row.locked = row.joint in names
+    setup.quiet()
+    models = timed_models(scene, locks, sum(row.taken_out for row in free if row.same_bits))
+    models[-1].error = error
+    actuators = {each.name for each in scene.whole.spec.actuators} - {
+        each.name for each in model.spec.actuators
+    }
+    result.tables |= {"reduction_models": models, "reduction_free": free, "reduction_joints": locks.rows}
+    used = scene.use.parts(scene.whole.model).items()
+    result.tables["reduction_use"] = [
+        UseRow(part, count, len(of), ", ".join(sorted(of))) for part, (count, of) in used
+    ]
+    result.top.append(result.finding(
+        "answer", about=about, unit=movement_unit(coordinates_of(scene)), names=names, moved=scene.use.moved,
+        models=models, free=[row for row in free if row.same_bits], actuators=sorted(actuators), error=error,
+        written=write if is_written else "", refused=write and not is_written,
+        assets=assets_of(draft).name if files_of(model.spec) else "",
+    ))  # fmt: skip
+
+
+def timed_models(scene: Scene, locks: Locks, elements: int) -> list[ModelRow]:
+    """The models on the way, and the time of a step of each; elements: how many never act."""
+    _, free, _ = locks.models[0]
+    models = [("the file", scene.whole, 0.0, list[str]())]
+    models += [(f"without what never acts ({elements})", free, 0.0, [])] if elements else []
+    models += [(f"and {names[-1]} locked", model, error, names) for names, model, error in locks.models[1:]]
+    calls = {number: scene.timed(small) for number, (_, small, *_) in enumerate(models)}
+    seconds = fastest(calls, ROUNDS, time.thread_time)  # other programs may wait for the processor, too
+    of_step = 1e6 * scene.stepper.dt / scene.duration
+    rows = [ModelRow(name, len(names), error, ", ".join(names)) for name, _, error, names in models]
+    for number, row in enumerate(rows):
+        row.step = of_step * seconds[number]
+    return rows
+
+
+def add_checks(result: Result, scene: Scene, locks: Locks, error: float, allowed: float) -> None:
+    """A smaller model is within the error, what is taken out changes no bit, and locks are those of tmt."""
+    (_, free, _), (names, model, _) = locks.models[0], locks.models[-1]
+    unit, note = movement_unit(coordinates_of(scene)), f"locked: {', '.join(names)}"
+    changed = scene.error(Smaller(free.spec.copy()))
+    result.check(scene.name, "motion without what never acts", changed, 0.0, unit, rule="equal")
+    result.check(
+        scene.name, "motion of the smaller model", error, allowed, unit, note, about=About.PREDICTION
+    )
+    if names:
+        tree = scene.tree.lock(of_parts(scene.whole.model, {name: scene.use.middle[name] for name in names}))
+        compare_locked(result, f"{scene.name}, {note}", tree, read(model.model).tree)
+
+
+def coordinates_of(scene: Scene) -> Coordinates:
+    return Coordinates(scene.tree.joint_names, scene.tree.kind)
+
+
+def compare_locked(result: Result, where: str, tree: Tree, smaller: Tree) -> None:
+    """Mbar and the bias of a Tree with joints locked, and of the smaller model, at random states."""
+    coordinates, rng = Coordinates(tree.joint_names, tree.kind), np.random.default_rng(SEED)
+    q, v = coordinates.random(rng, STATES), rng.uniform(-1.0, 1.0, (STATES, coordinates.nv))
+    bodies, others = tree.body_joint, smaller.body_joint
+    fused = np.array([bodies.count(joint) - others.count(joint) + 1 for joint in bodies])
+    scale, is_mixed = Entries(tree, q, v, np.maximum(1, fused)), "slide" in coordinates.all_kinds
+    masses, forces = zip(*((tmt.mass_matrix(q, model), tmt.bias(q, v, model)) for model in (tree, smaller)))
+    for name, unit, (locked, other), scales in (
+        ("Mbar", "kg m2, kg m or kg" if is_mixed else "kg m2", masses, scale.mass_matrix),
+        ("bias", "N m or N" if is_mixed else "N m", forces, scale.bias),
+    ):
+        apart, largest = worst_of_each(locked - other, scales)
+        (worst,) = closest(apart, largest)
+        quantity, tolerance = f"{name}, lock of tmt to the smaller model", FACTOR * EPS * largest[worst]
+        result.check(where, quantity, apart[worst], tolerance, unit, rounding=True)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[partial[Any]]:
-    from . import figures_reduction  # matplotlib is for the process that draws
+    from .figures_reduction import draw_models  # matplotlib is for the process that draws
 
-    if frontier := result.tables.get("reduction_frontier"):
-        yield partial(figures_reduction.draw_frontier, result, frontier)
+    if models := result.tables.get("reduction_models"):
+        yield partial(draw_models, result, models)

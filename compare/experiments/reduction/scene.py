@@ -1,117 +1,80 @@
-"""The motions of a file that smaller models repeat: of a keyframe, recorded controls, a user's scenes."""
-
-from collections.abc import Iterable
-from dataclasses import dataclass
-from functools import cached_property
+"""The motions that smaller models repeat: of a keyframe, recorded controls, a user's scenes, the arm's scenes."""
 
 import numpy as np
 
-from ...engines.mujoco.motion import Motion, Path, Simulation, Use, apart, data_at, inputs_of, used
+from ...engines.mujoco.motion import Motion, Scene, actuators
+from ...engines.mujoco.names import INTEGRATORS, element_name, joint_places, set_control
 from ...engines.mujoco.reading import Reading
-from ...engines.mujoco.smaller import Smaller
-from ...engines.mujoco.step import start_of
+from ...engines.mujoco.smaller import Smaller, locked
+from ...engines.mujoco.source import Source
+from ...engines.mujoco.stepper import Stepper
 from ...robots.case import Case
-from ...robots.coordinates import Coordinates
-from ...stability.place import posture_of, postures_of, standing_at
-from ...stability.rest import NEAR_REST
+from ...stability.place import posture_of, postures_of
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe
-FINER = 8  # fold, the step of the reference
-STANDS = 0.1  # rad or m: what sinks less to its rest stands there
-
-
-@dataclass(frozen=True)
-class Scene:
-    """The motions of a file, by its own step and integrator unless others are said.
-
-    whole: the file with everything. points: names of sites whose places count too.
-    """
-
-    reading: Reading
-    motions: list[Motion]
-    whole: Smaller
-    points: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        return "; ".join(motion.name for motion in self.motions)
-
-    @property
-    def duration(self) -> float:
-        return sum(motion.duration for motion in self.motions)
-
-    @cached_property
-    def use(self) -> Use:
-        return used(self.simulation(self.whole))
-
-    @property
-    def coordinates(self) -> Coordinates:
-        return Coordinates(self.reading.tree.joint_names, self.reading.tree.kind)
-
-    def simulation(self, small: Smaller, dt: float | None = None, integrator: str = "") -> Simulation:
-        reading = self.reading
-        return Simulation(small.model, self.motions, dt or reading.dt, integrator or reading.integrator)
-
-    def run(self, small: Smaller, dt: float | None = None, integrator: str = "") -> list[Path]:
-        return self.simulation(small, dt, integrator)()
-
-    def finely(self, small: Smaller) -> list[Path]:
-        """By a finer step; of order 4 where no constraint makes the motion less smooth."""
-        integrator = self.reading.integrator if self.use.has_constraints else "RK4"
-        return self.run(small, self.reading.dt / FINER, integrator)
-
-    def positions(self, small: Smaller) -> np.ndarray:
-        """Some of the positions of its run, (states, nq)."""
-        return np.vstack([path.samples for path in self.run(small)])
-
-    def apart(self, paths: Iterable[Path], others: Iterable[Path]) -> float:
-        """How far runs are apart, rad or m."""
-        return apart(list(paths), list(others), self.points)
+EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
 
 
 def scene_of(setup: Setup, reading: Reading) -> Scene:
-    """All of --scenes; else --controls from a posture; else a posture, of a robot that stands its rest.
-
-    ValueError where that cannot be.
-    """
+    """All of --scenes; else --controls, or what the file states, from a posture. ValueError: that cannot be."""
     request = setup.request
     points = tuple(request.points.split(",")) if request.points else ()
     whole = Smaller.whole(reading.source, points)
+    stepper = Stepper(whole.model, reading.dt, reading.integrator)
     cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
-    motions = [motion_of_case(case, reading, whole) for case in cases]
-    scene = Scene(reading, motions or [motion_of_posture(setup, reading, whole)], whole, points)
-    paths = scene.run(whole)
-    if scene.apart(paths, paths):  # not finite
-        raise ValueError(f"the file's own run fails ({reading.integrator}, {1e3 * reading.dt:g} ms)")
-    return scene
+    for case in cases:
+        if case.scene.locked or np.any(case.scene.damping) or not case.scene.gravity:
+            raise ValueError(f"the scene {case.name} changes the model: locked, damping or gravity")
+    motions = [motion_of_case(case, stepper) for case in cases]
+    if not motions:
+        posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
+        state = stepper.start(posture.key, np.array(posture.q) if posture.q else None)
+        times = np.array((request.controls or {}).get("time", [DURATION]))
+        steps, controls = max(1, round(times[-1] / reading.dt)), None
+        if request.controls:
+            controls = np.tile(state[stepper.places["ctrl"]], (steps, 1))
+            at = np.searchsorted(times, reading.dt * np.arange(steps) + EARLY, side="right") - 1
+            for name, (places, _) in actuators(whole.model).items():
+                if name in request.controls:
+                    controls[:, places] = request.controls[name][at, None]
+        motions = [Motion(posture.name, state, steps, controls)]
+    return Scene(reading.tree, whole, stepper, motions, points)
 
 
-def motion_of_case(case: Case, reading: Reading, whole: Smaller) -> Motion:
-    scene, still = case.scene, np.zeros(reading.model.nv)
-    if scene.locked or np.any(scene.damping) or not scene.gravity:
-        raise ValueError(f"the scene {scene.name} changes the model: locked, damping or gravity")
-    key = scene.posture if isinstance(scene.posture, str) and scene.posture in reading.keyframes else ""
-    controls = case.controller.controls if case.controller else ()
-    state = start_of(reading.model, reading.drive, key, still, case.posture, controls)
-    data = data_at(reading.model, state, whole.model)
-    data.qvel[:] = case.v
-    data.qfrc_applied[:] = 0.0 if case.controller else case.tau
-    return Motion(scene.name, scene.duration, data, np.zeros(1), inputs_of(data, 1))
+def scene_of_case(case: Case, source: Source) -> Scene:
+    """A scene of a robot whose numbers are stated, with its damping, gravity and locks, by its file's step.
+
+    It ends where rounding has grown, if the scene says so.
+    """
+    scene, whole = case.scene, Smaller.whole(source)
+    for more, name in zip(np.broadcast_to(scene.damping, len(case.robot.joints)), case.robot.joints):
+        joint = whole.spec.joint(name)
+        damping = np.array(joint.damping, dtype=float)  # since MuJoCo 4 the first of three numbers
+        damping.flat[0] += more
+        joint.damping = damping if damping.ndim else float(damping)
+    if not scene.gravity:
+        whole.spec.option.gravity = np.zeros(3)
+    joints, q = case.robot.coordinates.by_name, case.robot.posture(scene.posture)
+    whole = locked(Smaller(whole.spec), {name: q[joints[name].q] for name in scene.locked})
+    integrator = next(name for name, member in INTEGRATORS.items() if member == whole.model.opt.integrator)
+    stepper = Stepper(whole.model, float(whole.model.opt.timestep), integrator)
+    return Scene(case.tree, whole, stepper, [motion_of_case(case, stepper)])
 
 
-def motion_of_posture(setup: Setup, reading: Reading, whole: Smaller) -> Motion:
-    """With the recorded controls, if there are any."""
-    request = setup.request
-    posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
-    q, name = np.array(posture.q) if posture.q else None, posture.name
-    state = start_of(reading.model, reading.drive, posture.key, np.zeros(reading.model.nv), q)
-    recorded = dict(request.controls or {})
-    times = recorded.pop("time", np.zeros(1))
-    if not recorded:
-        place = standing_at(reading, posture)
-        if place.left <= NEAR_REST and np.abs(place.moved).max(initial=0.0) <= STANDS:
-            state, name = place.rest, f"{name}, at rest"
-    data = data_at(reading.model, state, whole.model)
-    inputs = inputs_of(data, len(times)) | {name: values[:, None] for name, values in recorded.items()}
-    return Motion(name, float(times[-1]) or DURATION, data, times, inputs)
+def motion_of_case(case: Case, stepper: Stepper) -> Motion:
+    """The motion of a scene: its posture, speeds, and torques or controls."""
+    scene, m = case.scene, stepper.model
+    q, v, forces = m.qpos0.copy(), np.zeros(m.nv), np.zeros(m.nv)
+    for name, place in joint_places(m).items():
+        joint = case.coordinates.by_name[name]
+        q[place.qpos], v[place.dofs] = case.q[joint.q], case.v[joint.qd]
+        forces[place.dofs] = 0.0 if case.controller else case.tau[joint.qd]
+    is_key = scene.posture in [element_name(m, "key", number) for number in range(m.nkey)]
+    data = stepper.put(stepper.start(str(scene.posture) if is_key else "", q, v))
+    data.qfrc_applied[:] = forces
+    for number, u in enumerate(case.controller.controls if case.controller else ()):
+        if u is not None:
+            set_control(m, number, u, data.ctrl, data.act)
+    lasts = min(scene.judged or scene.duration, scene.duration)
+    return Motion(scene.name, stepper.state(), max(1, round(lasts / stepper.dt)))

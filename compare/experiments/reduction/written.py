@@ -7,22 +7,18 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ...core.text import block
-from ...engines.mujoco.smaller import MARK, assets_of
+from ...engines.mujoco.motion import Scene
+from ...engines.mujoco.smaller import Smaller, assets_of, finished, is_written
 from ...engines.mujoco.source import Source
-from ...process.parts import needed_by
 from ...report.folder import OWN
 
-TEXT = "reduction_of_file"
+TEXT = "reduction"  # the template
 
 
-def needed_of(*sources: Source) -> list[Path]:
-    """The files of models, and those that they include, attach and load."""
-    files: list[Path] = []
-    for source in sources:
-        if isinstance(source.origin, Path) and source.spec:
-            meshes = (Path(source.origin.parent, mesh.file) for mesh in source.spec.meshes)  # package:// too
-            files += [*needed_by(source.origin), *meshes]
-    return files
+def written(scene: Scene, small: Smaller, path: Path, comment: str) -> Smaller:
+    """Write a model with the starts of the scene's motions as its keyframes; what is read again."""
+    finished(small, scene.starts(small)).write(path, comment)
+    return Smaller.whole(Source(path))
 
 
 def refusal(path: Path, needed: Iterable[Path], report: Path) -> str:
@@ -31,42 +27,26 @@ def refusal(path: Path, needed: Iterable[Path], report: Path) -> str:
     needed: the files that the model needs, which are never written to. report: the folder of the report, whose
     files the next report replaces. Only a file that this program wrote is replaced.
     """
+    assets, of_report = assets_of(path), [report.resolve() / name for name in OWN]
+    rules = {  # by the names that the template has
+        "link": path.is_symlink,
+        "folder": path.is_dir,
+        "no_folder": lambda: not path.parent.is_dir(),
+        "not_regular": lambda: path.exists() and not path.is_file(),
+        "needed": lambda: path.exists() and any(file.exists() and path.samefile(file) for file in needed),
+        "foreign": lambda: path.exists() and not is_written(path),
+        "read_only": lambda: path.exists() and not os.access(path, os.W_OK),
+        "report": lambda: any(path.resolve().is_relative_to(part) for part in of_report),
+        "assets": lambda: os.path.lexists(assets) and not assets.is_dir(),
+    }
     try:
-        return block(TEXT, "refusal", why=why_not(path, needed, report), assets=assets_of(path).name)
+        for why, applies in rules.items():
+            if applies():
+                return block(TEXT, "refusal", why=why, assets=assets.name)
+        with tempfile.TemporaryFile(dir=path.parent):
+            return ""
     except (OSError, ValueError) as error:  # a name that is too long, a folder that is read-only
         return getattr(error, "strerror", None) or str(error)
-
-
-def why_not(path: Path, needed: Iterable[Path], report: Path) -> str:
-    """The kind of refusal, as the template names it; OSError where the folder takes no file."""
-    if path.is_symlink():
-        return "link"
-    if path.is_dir():
-        return "folder"
-    if not path.parent.is_dir():
-        return "no_folder"
-    if path.exists():
-        if not path.is_file():
-            return "not_regular"
-        if any(file.exists() and path.samefile(file) for file in needed):
-            return "needed"
-        if not is_written(path):
-            return "foreign"
-        if not os.access(path, os.W_OK):
-            return "read_only"
-    if any(path.resolve().is_relative_to(report.resolve() / name) for name in OWN):
-        return "report"
-    if os.path.lexists(assets_of(path)) and not assets_of(path).is_dir():
-        return "assets"
-    with tempfile.TemporaryFile(dir=path.parent):
-        return ""
-
-
-def is_written(path: Path) -> bool:
-    """Whether this program wrote a file: a comment in its first line says so."""
-    with open(path, "rb") as file:
-        first = file.readline(1000)
-    return path.suffix == ".xml" and first.startswith(b"<!--") and MARK.encode() in first
 
 
 @contextmanager

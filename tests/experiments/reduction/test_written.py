@@ -1,6 +1,7 @@
 """Where a smaller file may be written, and that an earlier one is whole until the last moment."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -10,7 +11,7 @@ from edited import setup_of_file
 from compare.cli.command_line import request
 from compare.core.check import Result
 from compare.engines.mujoco import ModelError
-from compare.experiments.reduction import of_file
+from compare.experiments import reduction
 from compare.experiments.setup import Request
 from compare.run.reference import compared_with
 
@@ -107,10 +108,12 @@ def refuse(*_, **__):
 
 
 def written(robot: Path, path: Path) -> Result:
-    setup, result = setup_of_file(robot), Result("reduction")
-    setup.__dict__.update(alone=True, request=Request(write=str(path)))
-    of_file.add(result, setup, setup.reading)
-    return result
+    return reduction.rows(replace(setup_of_file(robot), alone=True, request=Request(write=str(path))))
+
+
+def told(result: Result) -> str:
+    """The file that the answer names as written."""
+    return result.top[0].values["written"]
 
 
 def test_an_earlier_file_is_whole_until_the_checks_are_made(robot, monkeypatch, tmp_path):
@@ -124,18 +127,17 @@ def test_an_earlier_file_is_whole_until_the_checks_are_made(robot, monkeypatch, 
 
     def failed(result, *_):
         result.check("", "the written file", 1.0, 0.0, "m")
-        return 0.0
 
     files = {*tmp_path.iterdir()}
     with monkeypatch.context() as patch:
-        patch.setattr(of_file, "add_checks", interrupted)
+        patch.setattr(reduction, "add_checks", interrupted)
         with pytest.raises(KeyboardInterrupt):
             written(robot, path)
-        patch.setattr(of_file, "add_checks", failed)
-        assert written(robot, path).top[0].values["facts"]["is_written"] is False
+        patch.setattr(reduction, "add_checks", failed)
+        assert not told(written(robot, path))
     assert path.read_text() == MARKED and {*tmp_path.iterdir()} == files
     for _ in range(2):  # onto a new one, too
-        assert written(robot, path).top[0].values["facts"]["is_written"] is True
+        assert told(written(robot, path)) == str(path)
         assert path.read_text().startswith(MARKED)
         assert mujoco.MjModel.from_xml_path(str(path)).nmesh == 1
     assert {*tmp_path.iterdir()} == files | {tmp_path / "small_assets"}

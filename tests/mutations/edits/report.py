@@ -77,12 +77,8 @@ EDITS = (
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
     # of a file's motion
     ("reduction.search", "take_out", "trial if is_same else small", "trial", "what changes the motion is taken out"),
-    ("reduction.search", "answer_within", "row.error <= allowed", "True", "any error is within what is allowed"),
     ("reduction.search", "same_bits", "bits[0] == bits[1]", "True", "every motion is the same"),
+    ("reduction.scene", "scene_of", "_1 + EARLY", "_1 - EARLY", "a control acts a step too late"),
+    ("mujoco.motion", "Repeated.__init__", "here.qfrc_applied[v] = _1", "pass", "forces that act all the time are lost"),
     ("mujoco.motion", "apart", "np.isfinite(error)", "True", "a run that fails has no error"),
-    ("mujoco.motion", "couplings", "np.diag(inverse)", "1.0", "the prediction has no coupling through M"),
-    ("mujoco.motion", "Motion.controls", "_1 + EARLY", "_1 - EARLY", "a control acts a step too late"),
-    ("reduction.of_file", "add_checks", "scene.apart([path], [other])", "row.error", "the written file is not run"),
-    ("reduction.scene", "motion_of_posture", "place.left <= NEAR_REST and _1", "True", "what falls starts where it lies"),
-    ("reduction.search", "Answer.is_gain", "self.row.gain >= AS_FAST", "True", "no gain is called one"),
 )  # fmt: skip
