@@ -24,9 +24,9 @@ def kept(
     name = hashlib.sha256("\n".join([*parts, versions(), repr(what)]).encode()).hexdigest()[:32]
     path = folder / f"{name}.npz"
     with suppress(OSError):
-        content = store.read(path)
-        if content is not None:
-            with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        content = path.read_bytes()
+        if content[: store.DIGEST] == store.digest(path, content[store.DIGEST :]):
+            with np.load(io.BytesIO(content[store.DIGEST :]), allow_pickle=False) as arrays:
                 return list(arrays.values())
     arrays, file = list(compute()), io.BytesIO()
     np.savez(file, *arrays)

@@ -49,7 +49,8 @@ def test_a_step_is_differenced_in_movements(rng):
     reading = read(PATHS["mixed"])  # with quaternions
     dynamics, (q, _, tau) = engine(reading).of(case_of(reading.tree)), random_states(rng, reading.tree, 1)
     for integrator in ("Euler", "implicit"):
-        model, data = dynamics.own_copy(1e-3, integrator, q[0], 0.0, tau[0])
+        stepper = dynamics.stepper(1e-3, integrator)
+        model, data = stepper.model, stepper.put(dynamics.states(stepper, q[0], 0.0, tau[0])[1][0])
         A = np.zeros((2 * model.nv + model.na,) * 2)
         calls.mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)
         order = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])

@@ -19,7 +19,8 @@ from compare.engines.mujoco import parse
 from compare.robots.arm import ARM
 
 dynamics = parse(ARM.mjcf, ARM.tree).of(ARM.case())
-_, run = dynamics.runner((np.zeros(3),) * 3, 1e-4, 500_000, "RK4", None)
+stepper = dynamics.stepper(1e-4, "RK4")
+run = stepper.loop(stepper.start(), 500_000)
 print("now", flush=True)
 run()  # some seconds in C
 """

@@ -30,20 +30,16 @@ def of_transition(
 
     q: (nq,) rad, m; v, tau: (nv,). It does not take RK4, and its B is by controls.
     """
-    model, data = dynamics.own_copy(dt, integrator, q, v, tau)
-    A = np.zeros((2 * model.nv + model.na,) * 2)
-    places = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])
-
-    def call() -> np.ndarray:
-        mujoco.mjd_transitionFD(model, data, eps, centred, A, None, None, None)
-        return A[np.ix_(places, places)]
-
-    return call
+    stepper = dynamics.stepper(dt, integrator)
+    state, nv = dynamics.states(stepper, q, v, tau)[1][0], stepper.model.nv
+    places = np.concatenate([dynamics.dofs, nv + dynamics.dofs])
+    return lambda: stepper.derivative(state, eps, centred)[0][np.ix_(places, places)]
 
 
 def of_inverse(dynamics: MujocoDynamics, q: Array, v: Array, a: Array, eps: float) -> Call:
     """A call of mjd_inverseFD, one-sided: dtau/dq and dtau/dv side by side, (nv, 2 nv); a: (nv,)."""
-    model, data = dynamics.own_copy(1.0, "Euler", q, v)
+    stepper = dynamics.stepper(1.0, "Euler")
+    model, data = stepper.model, stepper.put(dynamics.states(stepper, q, v)[1][0])
     data.qacc[dynamics.dofs] = a
     by = np.zeros((2, model.nv, model.nv))
     places = np.ix_(dynamics.dofs, dynamics.dofs)
@@ -87,7 +83,8 @@ def left_to_itself(
     dynamics: MujocoDynamics, q: Array, qd: Array, tau: Array, dt: float, steps: int, integrator: str
 ) -> dict[str, Any]:
     """A run with MuJoCo's automatic reset: its clock's time (steps + 1,) s, q, qd; number of warnings."""
-    model, data = dynamics.own_copy(dt, integrator, q, qd, tau)
+    stepper = dynamics.stepper(dt, integrator)
+    model, data = stepper.model, stepper.put(dynamics.states(stepper, q, qd, tau)[1][0])
     model.opt.disableflags &= ~bit("AUTORESET")
     path = [(0.0, q, qd)]
     for _ in range(steps):
@@ -111,7 +108,8 @@ def loops(dynamics: MujocoDynamics, q: np.ndarray, v: np.ndarray, tau: np.ndarra
     """
     if (path := library()) is None:
         return {}
-    model, data = dynamics.own_copy(1.0, "RK4", q, v, tau)
+    stepper = dynamics.stepper(1.0, "RK4")
+    model, data = stepper.model, stepper.put(dynamics.states(stepper, q, v, tau)[1][0])
     model.opt.disableflags |= bit("CONTACT", "CONSTRAINT")
     mujoco.mj_forward(model, data)
     mass_matrix = "mj_makeM" if hasattr(ctypes.CDLL(path), "mj_makeM") else "mj_crb"

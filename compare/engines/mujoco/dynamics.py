@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from mujoco.rollout import rollout
 from numpy.typing import ArrayLike
 
 from ...robots.case import Case
@@ -22,7 +21,6 @@ from .names import (
     EVALUATIONS,
     INTEGRATORS,
     OF_A_JOINT,
-    bit,
     element_name,
     geom_name,
     joint_name,
@@ -31,15 +29,11 @@ from .names import (
     number_of_actuators,
     on,
 )
+from .stepper import Stepper
 
 Array = np.ndarray | float
 Pair = tuple[np.ndarray, np.ndarray]
 Read = Callable[[mujoco.MjData], ArrayLike]  # a quantity of a state
-
-# a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
-_log = mujoco.MjLogConfig.get()
-_log.logto_file = _log.logto_console = False
-_log.set()
 
 
 class Engaged(NamedTuple):
@@ -221,76 +215,57 @@ class MujocoDynamics:
         self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
         """Motion under constant torque: q, v (..., steps + 1, n), NaN from where it diverges."""
-        batch = np.broadcast_shapes(*(np.shape(value)[:-1] for value in (q, v, tau)))
-        starts, follow = self.runner((q, v, tau), dt, steps, method, tolerance)
-        q_path, v_path, ended = self.path(starts, follow(), dt)
-        q_path, v_path = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in (q_path, v_path))
-        evaluations, ended = len(starts) * steps * EVALUATIONS[method], ended.reshape(batch)[()]
-        return Motion(dt * np.arange(steps + 1), q_path, v_path, evaluations, ended, steps)
+        stepper = self.stepper(dt, method, tolerance)
+        batch, states = self.states(stepper, q, v, tau)
+        rolled, qpos, qvel = stepper.roll(states, steps), stepper.places["qpos"], stepper.places["qvel"]
+        q_path = np.concatenate([states[:, None, qpos], rolled.q], axis=1)
+        v_path = np.concatenate([states[:, None, qvel], rolled.v], axis=1)
+        return self.motion(q_path, v_path, dt, batch, EVALUATIONS[method])
 
     def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
         steps, every = int(setting.steps or 0), setting.every
-        dt, evaluations = setting.duration / steps, steps * EVALUATIONS[method]
-        starts, run = self.runner((q, v, tau), dt, steps, method, setting.tolerance)
-        t = np.linspace(0.0, setting.duration, GRID + 1)
+        dt, t = setting.duration / steps, np.linspace(0.0, setting.duration, GRID + 1)
+        stepper = self.stepper(dt, method, setting.tolerance)
+        state = self.states(stepper, q, v, tau)[1][0]
 
-        def read(states: np.ndarray) -> Motion:
-            q, v, ended = self.path(starts, states, dt)
-            return Motion(t, q[0, ::every], v[0, ::every], evaluations, ended[0], steps)
+        def read(physics: np.ndarray) -> Motion:
+            path = np.vstack([state[: physics.shape[1]], physics])  # time, qpos, qvel are first in both
+            path[1 + stepper.taken(physics) :] = np.nan
+            qpos, qvel = (path[None, :, stepper.places[name]] for name in ("qpos", "qvel"))
+            motion = self.motion(qpos, qvel, dt, (), EVALUATIONS[method])
+            return motion._replace(t=t, q=motion.q[::every], v=motion.v[::every])
 
-        return run, read
+        return stepper.loop(state, steps), read
 
-    def path(self, starts: np.ndarray, states: np.ndarray, dt: float) -> tuple[np.ndarray, ...]:
-        """q and v of runs (runs, steps + 1, ...), NaN from where one diverges, and why it does, or None."""
-        states = np.concatenate([starts[:, None], states], axis=1)
-        stands = np.diff(states[:, :, 0], axis=1, prepend=-dt) <= 0.0  # MuJoCo does not step from there
-        states[stands] = np.nan
-        t, ended = dt * np.arange(states.shape[1]), np.full(len(states), None, dtype=object)
-        for k, run in enumerate(states):
-            states[k], ended[k] = as_far_as_it_goes(t, run, run[0], "a number is not finite")
-        return states[:, :, 1 + self.qpos], states[:, :, 1 + self.model.nq + self.dofs], ended
+    def motion(
+        self, qpos: np.ndarray, qvel: np.ndarray, dt: float, batch: tuple[int, ...], evaluations: int
+    ) -> Motion:
+        """The Motion of runs, (runs, steps + 1, n), and why some end early. evaluations: of a step."""
+        q, v, steps = qpos[..., self.qpos], qvel[..., self.dofs], qpos.shape[1] - 1
+        t, ended = dt * np.arange(steps + 1), np.full(len(q), None, dtype=object)
+        for k, run in enumerate(np.concatenate([q, v], axis=-1)):
+            run, ended[k] = as_far_as_it_goes(t, run, run[0], "a number is not finite")
+            q[k], v[k] = run[:, : q.shape[-1]], run[:, q.shape[-1] :]
+        q, v = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in (q, v))
+        return Motion(t, q, v, len(ended) * steps * evaluations, ended.reshape(batch)[()], steps)
 
-    def runner(
-        self, state: tuple[Array, Array, Array], dt: float, steps: int, method: str, tolerance: Tolerance,
-        threads: int = 1,
-    ) -> tuple[np.ndarray, Callable[[], np.ndarray]]:  # fmt: skip
-        """The first states, time first, and a call of MuJoCo's C loop from them to (runs, steps, ...)."""
+    def stepper(self, dt: float, method: str, tolerance: Tolerance = None) -> Stepper:
+        """Steps of dt, s, by an integrator. ValueError for a tolerance."""
         if tolerance is not None:
             raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
-        model, data = self.own_copy(dt, method)
-        model.opt.disableflags |= bit("AUTORESET")  # a reset would hide the divergence
-        q, v, tau = state
-        rows, spec = rows_of_states(q, v, tau - self.constant)[1], mujoco.mjtState.mjSTATE_FULLPHYSICS
-        runs = len(rows[0])
-        starts = np.zeros((runs, mujoco.mj_stateSize(model, spec)))
-        # rollout zeroes qfrc_applied unless it is the control, and leaves out the initial state
-        torques = np.zeros((runs, steps, model.nu + model.nv))  # after the controls
-        torques[:, :, : model.nu] = data.ctrl
-        for start, torque, *values in zip(starts, torques, *rows):
-            data.qpos[self.qpos], data.qvel[self.dofs], torque[:, model.nu + self.dofs] = values
-            mujoco.mj_getState(model, data, start, spec)
-        # filled, so that the first run does not have to fetch the memory
-        states = np.full((runs, steps, starts.shape[1]), np.nan)
-        sensors = np.zeros((runs, steps, model.nsensordata))
-        controls = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_QFRC_APPLIED)
-        options = {"control_spec": controls, "nstep": steps, "state": states, "sensordata": sensors}
-        of_threads = [data, *(mujoco.MjData(model) for _ in range(threads - 1))]
+        return Stepper(self.model, dt, method)
 
-        def run() -> np.ndarray:
-            rollout([model] * runs, of_threads, starts, torques, skip_checks=True, **options)
-            return states
-
-        return starts, run
-
-    def own_copy(
-        self, dt: float, integrator: str, q: Array = 0.0, v: Array = 0.0, tau: Array = 0.0
-    ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-        """A copy of the model with this step and integrator, and data at one state."""
-        model, data = mujoco.MjModel.__copy__(self.model), mujoco.MjData(self.model)
-        model.opt.timestep, model.opt.integrator = dt, INTEGRATORS[integrator]
-        data.qpos[self.qpos], data.qvel[self.dofs], data.qfrc_applied[self.dofs] = q, v, tau - self.constant
-        data.ctrl[:], data.act[:] = self.data.ctrl, self.data.act
-        return model, data
+    def states(
+        self, stepper: Stepper, q: Array, v: Array = 0.0, tau: Array = 0.0
+    ) -> tuple[tuple[int, ...], np.ndarray]:
+        """The batch shape and the states, (runs, n), of a stepper under constant torque."""
+        batch, rows = rows_of_states(q, v, tau - self.constant)
+        states = np.tile(stepper.reset, (len(rows[0]), 1))
+        values = zip(("qpos", "qvel", "qfrc_applied"), (self.qpos, self.dofs, self.dofs), rows)
+        for name, columns, row in values:
+            states[:, stepper.places[name].start + columns] = row
+        states[:, stepper.places["ctrl"]], states[:, stepper.places["act"]] = self.data.ctrl, self.data.act
+        return batch, states
 
     def _each(self, read: Read, q: Array, v: Array = 0.0, tau: Array = 0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""

@@ -184,15 +184,22 @@ class Stepper:
         ends, ended = starts.copy(), np.full(len(starts), steps)
         for k, start in enumerate(starts):
             path = self.loop(start, steps, None if controls is None else controls[k])()
-            stopped = steps
-            if steps and self.data.warning.number.any():
-                last = int(np.argmax(path[:, 0] == path[-1, 0]))  # the step that warned
-                stopped = last if self.data.warning.number[BAD].any() else steps
-                if stopped == steps:  # of another kind, after which MuJoCo's own steps go on
-                    stopped = self.go_on(path, last + 1, None if controls is None else controls[k])
+            stopped = self.taken(path)
+            if stopped < steps and not self.data.warning.number[BAD].any():
+                stopped = self.go_on(path, stopped, None if controls is None else controls[k])
             paths[k, :stopped] = path[:stopped, : paths.shape[2]]
             ends[k], ended[k] = self.state(), stopped
         return Rolled(paths[:, :, 1 : 1 + m.nq], paths[:, :, 1 + m.nq :], ended, ends)
+
+    def taken(self, path: Array) -> int:
+        """How many steps of a path of `loop` there are, (steps, size), where the data are at its end.
+
+        A step after which a number is bad is not one of them; after another warning MuJoCo has not gone on.
+        """
+        if not self.data.warning.number.any():
+            return len(path)
+        warned = int(np.argmax(path[:, 0] == path[-1, 0]))  # from here on the last state is repeated
+        return warned if self.data.warning.number[BAD].any() else warned + 1
 
     def go_on(self, path: Array, first: int, controls: Array | None) -> int:
         """Fill a path in from its step `first` on, from where the data are; how many steps it has then."""

@@ -10,7 +10,6 @@ from tmt.compiled.cores import cores
 
 from ...core import timing
 from ...engines import LABELS, RECORDS, Array, Engine
-from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.outside import OutsideDynamics
 from ...engines.outside.file import EngineError, TooLong
 from ...robots.case import Case
@@ -54,8 +53,6 @@ def add_row(result: EnginesResult, case: Case, engine: Engine, worlds: int) -> f
         prepared, seconds, device, end = dynamics.batch((q, v, tau), dt, STEPS, method)
     else:
         run: Callable[[], object] = partial(dynamics.run, q, v, tau, dt, STEPS, method)
-        if isinstance(dynamics, MujocoDynamics):  # its loop over the worlds in C, on all cores
-            _, run = dynamics.runner((q, v, tau), dt, STEPS, method, None, threads=cores())
         seconds = timing.fastest({"": run}, 5)[""]
         end = dynamics.run(q[:1], v[:1], tau[:1], dt, STEPS, method).q[0, -1]
     error = float(np.abs(case.coordinates.difference(end, exact(case, dt))).max())

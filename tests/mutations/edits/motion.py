@@ -22,7 +22,7 @@ EDITS = (
     ("controller", "controller", "np.abs(moment) @ moved", "moment @ moved", "a tendon's target moves by a difference"),
     ("controller", "reason", "actuator.stiffness(u) < 0.0", "False", "what pushes away takes part, as another scheme"),
     ("engine", "methods_for", "lone or tree.has_gains", "lone", "velocity gains are thought explicit in implicitfast"),
-    ("mujoco.dynamics", "MujocoDynamics.runner", "tau - self.constant", "tau", "the torque of servos acts twice"),
+    ("mujoco.dynamics", "MujocoDynamics.states", "tau - self.constant", "tau", "the torque of servos acts twice"),
     ("run", "LEAST_JUDGED", "0.1", "0.0", "a run of a file that is judged until 0 s agrees"),
     ("run", "widths", "np.minimum(_1, most)", "0.0 * _1 + most", "a band wider than the movement judges it"),
     ("run", "widths", "largest >= STILL * of_unit", "True", "a joint that hardly moves ends the time that is judged"),
