@@ -1,38 +1,35 @@
 """Exported equations at random states, compared with MuJoCo and exact values; what an evaluation costs."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from tmt.derivation.quantities import quantity_of
+import tmt
+from tmt.derivation.quantities import argument_of, quantity_of
 from tmt.exact.many import Pairs, exact_of_many
-from tmt.export.parameters import PAYLOAD, PLACES, Parameters
+from tmt.export.parameters import Parameters
 
 from ..core import timing
-from ..engines.mujoco import engine, read, tree_with_sites
+from ..engines.mujoco import tree_with_sites
 from ..engines.mujoco.calls import loops
-from ..engines.mujoco.smaller import changed
-from ..experiments.quantities import QUANTITIES, Quantity
+from ..experiments.quantities import QUANTITIES
 from ..judge.agree import closest, share_of
-from ..judge.entries import Entries, unit
-from ..judge.scale import FACTOR
+from ..judge.entries import Entries
+from ..judge.scale import FACTOR, gain_scale
 from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import SEED
-from ..robots.file import robot_of
 from ..run.reference import Compared
 from .programs import Array, CProgram, NotRun, Program, States, WrongProgram
 
 ROUNDS = 20  # of timing
 STEPS = 1e-3, 1e-2  # dt, s
-OF_EXACT = 1e-30  # of the largest exact value: what rounding may leave there of one that is zero
 OTHER = " (p)"  # after a quantity: with other values of the parameters
 LENGTH = 0.1  # m: how far a mass is moved for them
-Values = Mapping[str, Array]  # of arguments by name
 
 
 class Row(NamedTuple):
@@ -41,7 +38,7 @@ class Row(NamedTuple):
     quantity: str
     unit: str
     operations: int
-    from_mujoco: float | None  # None: MuJoCo has no such quantity
+    from_mujoco: float | None  # None: not compared
     of_mujoco: float | None  # share
     from_exact: float
     of_exact: float
@@ -66,73 +63,88 @@ class Outcome(NamedTuple):
         return bool(self.rows) and all(row.passed for row in self.rows)
 
 
-class Judge:
-    """What the values of a program at states are compared with."""
-
-    def __init__(self, compared: Compared, states: States, eps: float):
-        self.tree, self.states, self.factor, self.eps = compared.robot.tree, states, FACTOR * eps, eps
-        self.mujoco = compared.mujoco.of(compared.robot.case())
-        self.scales = Entries(self.tree, *states[:2])
-
-    def rows(self, program: Program, name: str) -> list[Row]:
-        taken = self.states[: max(3, len(quantity_of(name).takes))]
-        values, exact = program.values(name, self.states), exact_of_many(self.tree, name, *taken)
-        rows = []
-        for symbol, quantity in QUANTITIES.items():
-            if quantity.function == name:
-                largest = self.largest(quantity, values[quantity.part or 0], exact.part(quantity.part))
-                units = quantity.units
-                shown = units[0] if len(units) == 1 else unit(self.tree, *units)
-                row_name = name if quantity.part is None else symbol
-                rows.append(Row(row_name, shown, program.operations(name), *largest))
-        if not rows:  # MuJoCo has none
-            row, bound = quantity_of(name), program.rounding(name, self.states)
-            labels = row.parts or (name,)
-            for k, (label, value) in enumerate(zip(labels, values, strict=True)):
-                truth = exact.part(k if row.parts else None)
-                most = self.eps * bound[k] + OF_EXACT * np.abs(truth.high).max()
-                largest = worst_of(truth.distance(value), most)
-                rows.append(Row(label, row.unit, program.operations(name), None, None, *largest))
-        return rows
-
-    def largest(self, quantity: Quantity, values: Array, exact: Pairs) -> tuple[float, ...]:
-        """The largest difference from MuJoCo and its share of the tolerance, then from the exact value."""
-        arguments = self.states[: len(quantity.arguments)]
-        theirs = getattr(self.mujoco, quantity.function)(*arguments)
-        from_mujoco = values - (theirs if quantity.part is None else theirs[quantity.part])
-        scale = getattr(self.scales, quantity.scale)
-        if quantity.function == "acceleration":
-            scale = scale(self.scales.force(self.states[2]), exact.high)
-        tolerance = np.broadcast_to(self.factor * np.asarray(scale), exact.high.shape)
-        return *worst_of(from_mujoco, tolerance), *worst_of(exact.distance(values), tolerance)
-
-
 def checked(
     compared: Compared, make: Callable[[], Program], quantities: Sequence[str], count: int, single: bool,
-    other: Compared | None = None, values: Values | None = None,
+    chosen: Parameters | None = None,
 ) -> tuple[Outcome, Program | None]:  # fmt: skip
     """Run a program at random states; a float32 program is asked at states that float32 has.
 
-    other: the file with other values of the parameters, which the program is given then.
+    chosen: parameters, of which other values are tried too, beside tmt on a Tree that has them.
     """
     kind, names = np.float32 if single else np.float64, dict.fromkeys(quantities)
     states = [x.astype(kind).astype(float) for x in random_states(compared.robot, count)]
-    eps = float(np.finfo(kind).eps)
-    judge = Judge(compared, states, eps)
+    tree, factor, rows = compared.robot.tree, FACTOR * float(np.finfo(kind).eps), []
+    mujoco = compared.mujoco.of(compared.robot.case())
     try:
         program = make()
-        rows = [row for name in names for row in judge.rows(program, name)]
-        if other and values:
-            stated, program.parameters = program.parameters, values
-            judge = Judge(other, states, eps)
-            changed = [row for name in names for row in judge.rows(program, name)]
-            rows += [row._replace(quantity=row.quantity + OTHER) for row in changed]
-            program.parameters = stated
+        for name in names:
+            rows += rows_of(program, name, tree, states, factor, mujoco)
+        if chosen and chosen.values:
+            program.parameters = other_values(chosen, kind)
+            numbers = {name: list(value) for name, value in program.parameters.items()}
+            other = tmt.Tree(**vars(chosen.applied(tree, numbers)))
+            for name in names:
+                more = rows_of(program, name, other, states, factor)
+                rows += [row._replace(quantity=row.quantity + OTHER) for row in more]
     except NotRun as error:
         return Outcome(not_run=str(error)), None
     except WrongProgram as error:
         return Outcome(wrong=str(error)), None
     return Outcome(tuple(rows), file=program.file), program
+
+
+def rows_of(
+    program: Program, name: str, tree: tmt.Tree, states: States, factor: float, mujoco: Any = None
+) -> Iterator[Row]:
+    """A row for each array of a quantity: its values beside the exact ones of a Tree and, if given, MuJoCo's."""
+    row, operations, entries = quantity_of(name), program.operations(name), Entries(tree, *states[:2])
+    values = program.values(name, states)
+    exact = exact_of_many(tree, name, *states[: max(3, len(row.takes))])
+    counterparts = {symbol: x for symbol, x in QUANTITIES.items() if x.function == name}
+    labels = list(counterparts) if row.parts and counterparts else row.parts or [name]
+    sizes = [] if counterparts else list(scales_of(entries, name, states, exact))
+    for k, label in enumerate(labels):
+        value, truth = (values[:, k], exact.part(k)) if row.parts else (values, exact)
+        from_mujoco: tuple[float | None, float | None] = None, None
+        if counterparts:
+            quantity = list(counterparts.values())[k]
+            unit = quantity.unit(tree)
+            scale = quantity.size(entries, states[2], truth.high)
+        else:
+            unit, scale = row.unit, sizes[k]
+        tolerance = np.broadcast_to(factor * np.asarray(scale), value.shape)
+        if counterparts and mujoco is not None:
+            theirs = getattr(mujoco, name)(*states[: len(row.takes)])
+            from_mujoco = worst_of(value - (theirs[k] if row.parts else theirs), tolerance)
+        yield Row(label, unit, operations, *from_mujoco, *worst_of(truth.distance(value), tolerance))
+
+
+def scales_of(entries: Entries, name: str, states: States, exact: Pairs) -> Sequence[Array]:
+    """The scales of a quantity that MuJoCo has not, one for each of its arrays."""
+    (q, qd, third, dt), tree, n = states, entries.tree, entries.tree.coordinates.nv
+    function, argument = name.partition(":")[0], argument_of(name)
+    if function == "inverse_mass_matrix":
+        return [entries.solved(np.eye(n), exact.high)]
+    if function == "inverse_dynamics":
+        return [entries.residual(entries.force() + gain_scale(tree, q, qd), third)]
+    if function == "inverse_dynamics_derivatives":
+        return entries.force_rates(third)
+    if function in ("derivatives", "step_derivatives"):
+        qdd, by = tmt.acceleration(q, qd, third, tree), tmt.derivatives(q, qd, third, tree)
+        scale = entries.derivatives(third, qdd, by)
+        return scale if function == "derivatives" else [entries.step(dt[:, :, None], by, scale)]
+    # what belongs to a frame is that of a body that has its centre of mass there
+    site, names = tree.site_of(argument), [f"body {b}" for b in range(len(tree.mass) + 1)]
+    body = {"body_joint": site.joint, "mass": 0.0, "com": site.offset, "inertia": np.zeros((3, 3))}
+    fields = {field: [*getattr(tree, field), value] for field, value in body.items()}
+    of_body = Entries(replace(tree, body_names=names, **fields), q, qd)
+    if function == "frame_pose":
+        scale = np.full(exact.high.shape, of_body.count[-1])
+        scale[..., 3] = of_body.positions[:, -1]
+        return [scale]
+    both = (of_body.T, of_body.B) if function == "frame_jacobian" else (of_body.v_conv, of_body.w_conv)
+    shape = len(q), 3, *exact.high.shape[2:]
+    return [np.concatenate([np.broadcast_to(scale[:, -1], shape) for scale in both], axis=1)]
 
 
 def random_states(robot: Robot, count: int) -> list[Array]:
@@ -157,51 +169,31 @@ def with_sites(compared: Compared) -> Compared:
     return compared._replace(robot=replace(compared.robot, tree=tree))
 
 
-def other_values(parameters: Parameters) -> Values:
-    """Random values near the model's; masses of a payload are some kg."""
+def other_values(chosen: Parameters, kind: type = float) -> dict[str, Array]:
+    """Random values near the model's, numbers of that kind: 0.5 to 1.5 kg more, and an inertia that a body can have."""
     rng, values = np.random.default_rng(SEED), {}
-    for name, stated in parameters.values.items():
-        part, _ = parameters.places.get(name, ("gravity", 0))
-        value = np.array(stated)
+    for name, stated in chosen.values.items():
+        part, _ = chosen.places.get(name, ("gravity", 0))
+        by = rng.uniform(-LENGTH, LENGTH, len(stated))
         if part == "mass":
-            value = (value + name.startswith(PAYLOAD)) * rng.uniform(0.5, 1.5)
-        elif part == "inertia":
-            root = rng.uniform(-LENGTH, LENGTH, (3, 3))  # of the second moment of 1 kg
-            second = root @ root.T
-            tensor = np.trace(second) * np.eye(3) - second
-            value = np.array([tensor[place] for place in PLACES])
-        else:
-            value = value + rng.uniform(-LENGTH, LENGTH, value.shape)
-        values[name] = value
+            by = 1.0 + 5.0 * by  # kg
+        elif part == "inertia":  # kg m2, of 1 kg
+            by = LENGTH**2 * (np.array([2.0] * 3 + [0.0] * 3) + 2.0 * by)
+        values[name] = (np.array(stated) + by).astype(kind).astype(float)
     return values
-
-
-def with_values(compared: Compared, parameters: Parameters, values: Values) -> Compared:
-    """What is compared, from the file with these values."""
-    reading = read(changed(compared.mujoco.source, compared.robot.tree, parameters, values))
-    shown = compared.robot.name
-    return with_sites(Compared(compared.reference, robot_of(reading, shown), engine(reading), reading))
 
 
 def times(
     compared: Compared, program: Program | None, quantities: Sequence[str], count: int
 ) -> list[dict[str, Any]]:
-    """ns of an evaluation by C, also compiled for this processor, and by mj_forward; []: not C."""
+    """ns of an evaluation by C and by mj_forward; []: not C."""
     if not isinstance(program, CProgram):
         return []
-    names, states = list(dict.fromkeys(quantities)), random_states(compared.robot, count)
-    libraries = {"c": program.library} | program.faster()
-    calls: dict[object, Callable[..., Any]] = {}
-    for name in names:
-        for flag, library in libraries.items():
-            calls[name, flag], _ = program.call(name, states, library)
+    states = random_states(compared.robot, count)
+    calls: dict[str, Callable[..., Any]] = {name: program.call(name, states)[0] for name in quantities}
     of_mujoco = loops(compared.mujoco.of(compared.robot.case()), *(x[0] for x in states[:3]))
     if of_mujoco:
         calls["mujoco"] = partial(of_mujoco["MuJoCo, mj_forward"], count)
     seconds = timing.fastest(calls, ROUNDS, time.thread_time)
-    ns = {key: 1e9 * taken / count for key, taken in seconds.items()}
-    rows = []
-    for name in names:
-        faster = {flag: ns[name, flag] for flag in libraries if flag != "c"}
-        rows.append({"quantity": name, "c": ns[name, "c"], "mujoco": ns.get("mujoco"), "faster": faster})
-    return rows
+    ns = {name: 1e9 * taken / count for name, taken in seconds.items()}
+    return [{"quantity": x, "c": ns[x], "mujoco": ns.get("mujoco")} for x in dict.fromkeys(quantities)]

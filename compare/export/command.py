@@ -12,8 +12,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-
 import tmt
 from tmt.export import is_word
 from tmt.export.parameters import Parameters
@@ -113,12 +111,9 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             Path(folder, file).write_text(text, encoding="utf-8")
         terminal.show(f"runs what was written, at {STATES} states")
         chosen = Parameters(robot.tree, named)
-        stated = {x: np.array(value) for x, value in chosen.values.items()}
-        values = checks.other_values(chosen)
-        other = checks.with_values(compared, chosen, values) if values else None
-        arguments = Path(folder), name, robot.tree, quantities, options.float, stated, chosen
+        arguments = Path(folder), name, robot.tree, quantities, options.float, chosen
         make = partial(programs.PROGRAMS[options.to], *arguments)
-        outcome, program = checks.checked(compared, make, quantities, STATES, options.float, other, values)
+        outcome, program = checks.checked(compared, make, quantities, STATES, options.float, chosen)
         times = checks.times(compared, program, quantities, STATES)
     facts = {"outcome": outcome, "times": times, "states": STATES, "features": robot.features}
     facts |= {"name": in_one_line(robot.name), "command": in_one_line(command), "mujoco": installed("mujoco")}

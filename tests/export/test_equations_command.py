@@ -16,7 +16,7 @@ import tmt
 from compare.__main__ import main
 from compare.experiments.quantities import QUANTITIES as COMPARED
 from compare.export import checks
-from compare.export.checks import with_sites, with_values
+from compare.export.checks import with_sites
 from compare.export.command import FILES, identifier
 from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, WrongProgram
 from compare.robots.arm import ARM
@@ -69,16 +69,19 @@ class Altered(Program):
     """tmt's own values, of which one entry of the last state is off by a multiple of its tolerance."""
 
     def __init__(self, tree, quantity, share, eps=2.0**-52):
-        self.tree, self.quantity, self.share, self.eps = tree, quantity, share, eps
+        self.tree, self.quantity, self.share, self.eps, self.chosen = tree, quantity, share, eps, None
+
+    def start(self):
+        """Nothing to do."""
 
     def values(self, quantity, states):
         found = getattr(tmt, quantity)(*states[: len(QUANTITIES[quantity].takes)], model=self.tree)
-        found = list(found) if isinstance(found, tuple) else [found]
+        found = np.stack(found, axis=1) if isinstance(found, tuple) else found
         if quantity == self.quantity:
             scales = checks.Entries(self.tree, states[0], states[1])
             scale = getattr(scales, quantity)
-            scale = scale(scales.force(states[2]), found[0]) if quantity == "acceleration" else scale
-            found[0][-1, ..., 1] += self.share * 64 * self.eps * scale[-1, ..., 1]
+            scale = scale(scales.force(states[2]), found) if quantity == "acceleration" else scale
+            found[-1, ..., 1] += self.share * 64 * self.eps * scale[-1, ..., 1]
         return found
 
 
@@ -116,8 +119,8 @@ def test_a_wrong_value_is_a_failed_check_with_status_1_and_stands_in_the_file(tm
         (self.folder / "arm.py").write_text(text.replace("9.81", "9.8100001"), encoding="utf-8")
         started(self)
 
-    started = PythonProgram.__post_init__
-    monkeypatch.setattr(PythonProgram, "__post_init__", start)
+    started = PythonProgram.start
+    monkeypatch.setattr(PythonProgram, "start", start)
     assert main(["equations", "--to", "python", "--out", str(tmp_path / "out")]) == 1
     head = (tmp_path / "out" / "arm.py").read_text(encoding="utf-8")[:400]
     assert "Failed at 1,000 random states" in head and "bias" in head and "acceleration" in head
@@ -129,7 +132,7 @@ def test_what_cannot_be_run_is_written_and_says_so(error, status, said, tmp_path
     def start(self):
         raise error("no such thing")
 
-    monkeypatch.setattr(PythonProgram, "__post_init__", start)
+    monkeypatch.setattr(PythonProgram, "start", start)
     assert main(["equations", "--to", "python", "--out", str(tmp_path / "out")]) == status
     assert f"{said}: no such thing" in (tmp_path / "out" / "arm.py").read_text(encoding="utf-8")
 
@@ -194,21 +197,64 @@ def test_parameters_are_compared_with_the_file_that_has_other_values(language, t
     assert "payload_inertia" in text and "centre of mass of payload in the frame of rod" in text
 
 
-def test_a_wrong_parameter_is_found(tmp_path, monkeypatch):
-    """Its value goes to the program, and its rounding to the bound."""
-    compared = with_sites(compared_with("model", str(PATHS["gripper"])))
+@pytest.mark.parametrize("share, passes", [(0.5, True), (2.0, False)])
+@pytest.mark.parametrize("words, index", [(["gravity"], 2), (["arm.mass"], 0), (["payload", "arm"], 0)])
+def test_a_parameter_that_goes_in_a_little_wrong_is_found(words, index, share, passes, tmp_path):
+    """With other values alone: those of the model are what they were. By half and twice the tolerance of a hinge's bias."""
+    (tmp_path / "hinge.xml").write_text(HINGE)
+    compared = with_sites(compared_with("model", str(tmp_path / "hinge.xml")))
     tree = compared.robot.tree
-    chosen = Parameters(tree, ["gravity"])
-    text = tmt.equations(tree, "python", ["inverse_dynamics"], parameters=["gravity"])
+    text = tmt.equations(tree, "python", ["bias"], name="x", parameters=words)
     (tmp_path / "x.py").write_text(text)
-    stated, values = ({"gravity": np.array([0.0, 0.0, -g])} for g in (9.81, 9.0))
-    make = partial(PythonProgram, tmp_path, "x", tree, ["inverse_dynamics"], False, stated, chosen)
-    for other, passes in ((values, True), ({"gravity": values["gravity"] * (1.0 + 1e-13)}, False)):
-        second = with_values(compared, chosen, values)
-        outcome, _ = checks.checked(compared, make, ["inverse_dynamics"], COUNT, False, second, other)
-        assert [row.passed for row in outcome.rows] == [True, passes]
+    chosen = Parameters(tree, words)
+    stated, other = (next(iter(x.values()))[index] for x in (chosen.values, checks.other_values(chosen)))
+
+    class Wrong(PythonProgram):
+        def values(self, quantity, states):
+            values = super().values(quantity, states)
+            is_other = next(iter(self.parameters.values()))[index] != stated
+            scale = checks.Entries(changed(tree, chosen, self.parameters), *states[:2]).bias
+            return values + share * 64 * 2.0**-52 * scale * is_other
+
+    outcome, _ = checks.checked(
+        compared, partial(Wrong, tmp_path, "x", tree, ["bias"], False, chosen), ["bias"], COUNT, False, chosen
+    )
+    assert other != stated and [row.quantity for row in outcome.rows] == ["bias", "bias (p)"]
+    assert [row.passed for row in outcome.rows] == [True, passes]
 
 
+def changed(tree, chosen, parameters):
+    return tmt.Tree(**vars(chosen.applied(tree, {name: list(value) for name, value in parameters.items()})))
+
+
+@pytest.mark.parametrize("name", ["gripper", "pendulum_ball"])
+@pytest.mark.parametrize("quantity", [
+    "inverse_mass_matrix", "inverse_dynamics", "inverse_dynamics_derivatives", "derivatives", "step_derivatives:rk4",
+    "frame_pose:", "frame_jacobian:", "frame_convective:",
+])  # fmt: skip
+def test_what_mujoco_has_not_is_judged_by_exact_values_and_the_scale_of_each_entry(quantity, name, tmp_path):
+    """What is written passes; with 1e-8 of the largest entry it does not."""
+    compared = with_sites(compared_with("model", str(PATHS[name])))
+    tree = compared.robot.tree
+    quantity += tree.body_names[-1] if quantity.endswith(":") else ""
+    (tmp_path / "x.py").write_text(tmt.equations(tree, "python", [quantity], name="x"))
+
+    class Off(PythonProgram):
+        def values(self, quantity, states):
+            values = super().values(quantity, states)
+            at = np.unravel_index(np.argmax(np.abs(values)), values.shape)
+            values[at] *= 1.0 + self.by
+            return values
+
+    for by, passes in ((0.0, True), (1e-8, False)):
+        Off.by = by
+        outcome = outcome_of(partial(Off, tmp_path, "x", tree, [quantity]), quantity, compared=compared)
+        assert outcome.passed is passes and all(row.from_mujoco is None for row in outcome.rows)
+        assert all(row.of_exact < 1.0 for row in outcome.rows) is passes
+
+
+HINGE = """<mujoco><worldbody><body name="arm"><joint name="a" axis="0 1 0"/><inertial pos="0 0 -0.3" mass="1.2"
+diaginertia="0.01 0.02 0.01"/></body></worldbody></mujoco>"""
 SWING = """<mujoco><worldbody><body name="frame" pos="0 0 1" euler="20 0 10"><joint name="a" axis="0 1 0"/>
 <geom type="capsule" size="0.05" fromto="0 0 0 0.3 0 0"/><body name="rod" pos="0.3 0 0" euler="0 30 40">
 <joint name="b" axis="1 0 0"/><geom type="capsule" size="0.04" fromto="0 0 0 0 0.1 -0.3"/></body></body></worldbody></mujoco>"""
