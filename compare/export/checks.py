@@ -139,7 +139,7 @@ def scales_of(entries: Entries, name: str, states: States, exact: Pairs) -> Sequ
     fields = {field: [*getattr(tree, field), value] for field, value in body.items()}
     of_body = Entries(replace(tree, body_names=names, **fields), q, qd)
     if function == "frame_pose":
-        scale = np.full(exact.high.shape, of_body.count[-1])
+        scale = np.full(exact.high.shape, float(of_body.count[-1]))
         scale[..., 3] = of_body.positions[:, -1]
         return [scale]
     both = (of_body.T, of_body.B) if function == "frame_jacobian" else (of_body.v_conv, of_body.w_conv)
