@@ -258,6 +258,19 @@ def test_a_slip_of_a_table_is_named(change, said):
     assert said in message_of(bias=change(h), **states)
 
 
+@pytest.mark.parametrize("count, is_table", [(7, False), (8, True)])
+def test_fewer_than_eight_rows_are_no_table_of_which_one_is_wrong(count, is_table):
+    states, h = table(count)
+    h[3, 1] += 0.01
+    assert ("1 row of" in message_of(bias=h, **states)) is is_table
+
+
+def test_an_entry_that_agrees_has_no_cause():
+    found = differences(mass_matrix=mass_matrix, bias=wrong_bias)
+    assert {row.cause == "" for row in found if row.ratio <= 1.0} == {True}
+    assert {SIGN in row.cause for row in found if row.ratio > 1.0} == {True}
+
+
 @pytest.mark.parametrize("word, brought", [
     ("shifted", lambda h, noise: {"mass_matrix": [[[3.0 + x, 1.0], [1.0, 0.7]] for x in noise]}),
     ("exchanged", lambda h, noise: {"bias": np.column_stack([h[:, 1], h[:, 1] + noise])}),
@@ -283,6 +296,16 @@ def test_a_table_whose_states_are_rounded_too(more, is_rounded):
 ])  # fmt: skip
 def test_inputs_of_accelerations_are_named(factors, said):
     assert said in message_of(acceleration=lambda q, v, t: acceleration(q, v, np.array(factors) * t))
+
+
+@pytest.mark.parametrize("force, is_found", [
+    (lambda q, v: [0.0, 0.0], True), (lambda q, v: [0.0, 0.2 * v[1]], True), (lambda q, v: [np.sin(3.0 * q[0]), 0.0], False),
+])  # fmt: skip
+def test_a_gear_is_the_cause_where_nothing_else_is_left_over(force, is_found):
+    geared = lambda q, v, t: acceleration(q, v, [25.0, 1.0] * t - np.array(force(q, v)))  # noqa: E731
+    message = message_of(acceleration=geared)
+    assert "tau of hip: your acceleration takes 25 times it" in message
+    assert ("Probable cause: tau of hip" in message) is is_found
 
 
 def test_accelerations_alone_have_a_mass_matrix_and_a_bias():

@@ -1,13 +1,18 @@
 """Every figure of a small run as it lies on the paper: nothing cut, nothing over anything, no factor at the end of an axis."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
+from compare.core.check import Result
+from compare.core.finding import Finding
 from compare.experiments import EXPERIMENTS, module
 from compare.robots.arm import ARM
+from compare.run import drawing
 
 SLACK = 1.0  # pixels
 SMALLEST = 7.0  # points: letters that are still read where a page is 950 pixels wide
@@ -32,6 +37,16 @@ def flaws(figure) -> list[str]:
             if covered(ax, legend.get_window_extent().extents):
                 found.append(f"a legend on data: {[text.get_text() for text in legend.get_texts()]}")
     return found
+
+
+def test_no_figure_overwrites_one_whose_name_differs_in_its_case_alone(tmp_path, monkeypatch):
+    caption = Finding("mass", "summary", {})
+    calls = [lambda file=file: (file, None, caption) for file in ("m_a", "M_A", "m_a")]
+    experiment = SimpleNamespace(figures=lambda result, robot: calls, overview=lambda results, robot: ())
+    monkeypatch.setattr(drawing, "functions", lambda name: experiment)
+    monkeypatch.setattr(drawing.images, "save_figure", lambda figure, path: path.touch())
+    drawn = drawing.draw("mass", Result("mass"), ARM, tmp_path, {})
+    assert len({figure.file.casefold() for figure in drawn}) == len([*tmp_path.iterdir()]) == 3
 
 
 def texts_of(figure, panels, flat) -> list[Text]:

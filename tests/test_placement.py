@@ -73,17 +73,19 @@ def test_what_moves_as_stated_is_compared_in_its_place_and_said_to_be_otherwise(
         assert np.abs(energies).max() < 1e-12
 
 
-MOTOR = '</worldbody><actuator><motor name="drive" joint="gamma" gear="{}" ctrlrange="0 5"/></actuator>'
+MOTOR = """</worldbody><actuator><general name="drive" joint="gamma" gear="{}" ctrlrange="0 5"
+  biastype="affine" biasprm="0 -20 {}"/></actuator>"""
 LIMITED = GAMMA + ' range="0 {}"'
 
 
-@pytest.mark.parametrize("limit, gear, says", [
-    (1, 5, ()), (2, 5, ("not compared, and not as in the solution: limits of gamma",)),
-    (1, 6, ("not compared, and not as in the solution: actuators (drive)",)),
+@pytest.mark.parametrize("limit, gear, kv, says", [
+    (1, 5, -2, ()), (2, 5, -2, ("not compared, and not as in the solution: limits of gamma",)),
+    (1, 6, -2, ("not compared, and not as in the solution: actuators (drive)",)),
+    (1, 5, -3, ("not compared, and not as in the solution: actuators (drive)",)),
 ])  # fmt: skip
-def test_limits_and_actuators_that_differ_from_a_solution_are_told(limit, gear, says, tmp_path):
-    for name, numbers in {"file.xml": (limit, gear), "solution.xml": (1, 5)}.items():
-        changes = (GAMMA, LIMITED.format(numbers[0])), ("</worldbody>", MOTOR.format(numbers[1]))
+def test_limits_and_actuators_that_differ_from_a_solution_are_told(limit, gear, kv, says, tmp_path):
+    for name, numbers in {"file.xml": (limit, gear, kv), "solution.xml": (1, 5, -2)}.items():
+        changes = (GAMMA, LIMITED.format(numbers[0])), ("</worldbody>", MOTOR.format(*numbers[1:]))
         (tmp_path / name).write_text(edited(*changes))
     compared = compared_with(str(tmp_path / "solution.xml"), str(tmp_path / "file.xml"))
     assert compared.reference.otherwise == says

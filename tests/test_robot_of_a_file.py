@@ -12,7 +12,6 @@ import tmt
 from compare.engines.mujoco import engine, read
 from compare.experiments.speed.settings import scenes_of as scenes_of_speed
 from compare.robots import Feature, file
-from compare.robots.actuators import Drive
 from compare.robots.coordinates import floats, free_joints
 from compare.robots.file import COARSER, DURATION, SERVOS_ACT, RobotFile, robot_of, scenes_from
 
@@ -23,7 +22,7 @@ ONLY = (Feature("hinge", ("one",), "modelled", ""),)
 
 def file_of(tree, **changes):
     ranges, zero = (None,) * len(tree.kind), np.array(tree.zero)
-    return replace(RobotFile("", None, tree, ONLY, {}, zero, ranges, "Euler", 0.002, Drive()), **changes)
+    return replace(RobotFile("", None, tree, ONLY, {}, zero, ranges, "Euler", 0.002, None), **changes)
 
 
 def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
@@ -93,7 +92,7 @@ def test_what_rests_where_it_is_let_go_is_set_going():
     fastest = np.abs(tmt.acceleration(zero, zero, zero, replace(still, gravity=(0.0, 0.0, -1.0)))).max()
     for share, found in ((0.99, "set going"), (1.01, "let go")):  # of what is seen to move
         tree = replace(still, gravity=(0.0, 0.0, -share * 1e-6 / fastest))
-        assert scenes_from(tree, "qpos0", zero, 0.002, Drive())[-1].name == f"qpos0, {found}, damped"
+        assert scenes_from(tree, "qpos0", zero, 0.002, None)[-1].name == f"qpos0, {found}, damped"
 
 
 @pytest.mark.parametrize("sign, how", [(1.0, "set going"), (-1.0, "held")])
@@ -101,7 +100,7 @@ def test_what_a_spring_holds_rests(sign, how):
     """The forearm, whose weight is the spring's torque k (q - rest), or is beside it."""
     rest = sign * tmt.gravity_balance(np.zeros(1), FOREARM) / 2.0
     spring = replace(FOREARM, stiffness=(2.0,), rest=rest)
-    assert scenes_from(spring, "qpos0", np.zeros(1), 0.002, Drive())[0].name == f"qpos0, {how}"
+    assert scenes_from(spring, "qpos0", np.zeros(1), 0.002, None)[0].name == f"qpos0, {how}"
 
 
 @BOTH

@@ -91,7 +91,7 @@ class Answers:
     def by_machine_code(self, quantity: str, arguments: tuple[Any, ...]) -> Any:
         """The quantity of states; None where NumPy is to answer: few states, or something is wrong."""
         prepared = self.prepared.get(quantity)
-        may_be_singular = self.may_be_singular and quantity in literal.SOLVED
+        may_be_singular = self.may_be_singular and literal.is_solved(quantity)
         if prepared and not may_be_singular:
             for array, shape in zip(arguments, self.shapes):  # no generator, which takes as long as the rest
                 if type(array) is not ndarray or array.shape != shape or array.dtype is not DOUBLE:

@@ -12,13 +12,14 @@ from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
 from tmt.derivation.quantities import PLAIN, State, argument_of, quantity_of
-from tmt.derivation.vectors import Scalar
-from tmt.methods import method_named, transition
+from tmt.derivation.vectors import Rows, Scalar, Values, added
+from tmt.methods import METHODS, SemiImplicitEuler, method_named, transition
 from tmt.model import singular
 from tmt.model.tree import Tree, checked_model
 from tmt.model.values import states
 
-SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives")  # for which Mbar must be regular
+# for which Mbar must be regular; step_derivatives: where the method takes nothing implicitly
+SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives", "step_derivatives")
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
 
 
@@ -50,12 +51,16 @@ def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
     checked_model(tree)
     quantity, checked = quantity_of(name), states(tree, **arrays)
     batch = checked[0].shape[:-1]
-    if quantity.argument == "method":
-        return step_derivatives(argument_of(name), tree, *checked)
     scalars = {key: list(np.moveaxis(array, -1, 0)) for key, array in zip(arrays, checked)}
     state = State(tree, scalars, name=argument_of(name))
-    if name in SOLVED and not tree.never_singular:
-        check_regular(tree, state, batch)
+    if is_solved(name) and not tree.never_singular:
+        matrix = state.mass_matrix
+        if isinstance(stepping := METHODS.get(argument_of(name)), SemiImplicitEuler):
+            implicit = stepping.implicit(tree, list(state.qd), scalars["dt"][0])
+            matrix = added(matrix, implicit.matrix)
+        check_regular(tree, list(state.q), matrix, batch)
+    if quantity.argument == "method":
+        return step_derivatives(argument_of(name), tree, *checked)
     values = quantity.of(state)
     if quantity.parts:
         return tuple(gather(part, batch) for part in values)
@@ -74,10 +79,15 @@ def step_derivatives(
     return values
 
 
-def check_regular(tree: Tree, state: State, batch: tuple[int, ...]) -> None:
-    n = len(state.qd)
-    positions = gather(state.q, batch).reshape(-1, len(state.q))
-    if place := singular.first(tree, positions, gather(state.mass_matrix, batch).reshape(-1, n, n)):
+def is_solved(name: str) -> bool:
+    return name.partition(":")[0] in SOLVED
+
+
+def check_regular(tree: Tree, q: Values, matrix: Rows, batch: tuple[int, ...]) -> None:
+    """Raise ValueError where the matrix that a system is solved with is singular, at the first such state."""
+    n = len(matrix)
+    positions = gather(q, batch).reshape(-1, len(q))
+    if place := singular.first(tree, positions, gather(matrix, batch).reshape(-1, n, n)):
         at = ", ".join(f"{value:.6g}" for value in positions[place[0]])
         unit = " rad" if set(tree.kind) == {"hinge"} else ""
         raise ValueError(f"Mbar is singular at q = ({at}){unit}: {place[1]}")

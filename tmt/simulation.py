@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from tmt.arm import ARM
-from tmt.compiled.runner import Ended, runner_of
-from tmt.methods.stepping import DIVERGED, NEWTON, SMALL
+from tmt.compiled.runner import Ended, Runner, runner_of
+from tmt.methods.stepping import DIVERGED, MANY, MOST_EVALUATIONS, NEWTON, SMALL
 from tmt.model import singular, values
 from tmt.model.tree import Tree
 from tmt.model.values import shown
 
 Array = np.ndarray
+# runs and steps whose states are held at once where each is looked at
+RUNS, STEPS = 64, 1024
 
 
 class _Path(NamedTuple):
@@ -61,8 +63,8 @@ def simulate(
 
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar
     is singular, Newton's method does not find the stages of an implicit method, an adaptive method would need
-    steps below 1e-9 dt, or series take too many: `ended` of the result, a Motion, says which. Assignment,
-    part i.
+    steps below 1e-9 dt or more than 1e8 evaluations, or series take too many: `ended` of the result, a
+    Motion, says which. Ctrl-C interrupts it. Assignment, part i.
 
     Parameters
     ----------
@@ -101,19 +103,18 @@ def simulate(
     state = values.states(model, q=q, qd=qd, tau=tau)
     batch, runs = state[0].shape[:-1], math.prod(state[0].shape[:-1])
     *start, torque = (np.ascontiguousarray(part).reshape(runs, part.shape[-1]) for part in state)
-    # whether Mbar is singular is looked at in each step
-    within = every if taylor or model.never_singular else 1
-    path_q, path_qd = values.paths(runs, steps, within, model.coordinates.nq, model.coordinates.nv)
+    path_q, path_qd = values.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
     if steps * dt == np.inf:
         sizes = f"dt is {dt:g} and steps is {shown(steps)}"
         raise ValueError(f"{sizes}; their product is beyond the largest double")
     path_q[:, 0], path_qd[:, 0] = start
     if taylor:
         ended, evaluations = by_series(model, path_q, path_qd, torque, dt, every, tolerance)
-    else:
-        codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, within)
+    elif model.never_singular:
+        codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, every)
         ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
-        path_q, path_qd = (path[:, :: every // within] for path in (path_q, path_qd))
+    else:
+        ended, evaluations = in_blocks(runner, path_q, path_qd, torque, dt, tolerance, every)
     t = dt * np.arange(0, steps + 1, every)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
     return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
@@ -133,11 +134,39 @@ def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int
     return ended, count
 
 
-def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance: float) -> Array:
+def in_blocks(
+    runner: Runner, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int
+) -> Ended:
+    """Fill the paths where Mbar may be singular: a block of runs and steps at a time, as each is looked at."""
+    ended, evaluations, steps = np.full(len(q), None, dtype=object), 0, (q.shape[1] - 1) * every
+    q[:, 1:], qd[:, 1:] = np.nan, np.nan
+    for first_run in range(0, len(q), RUNS):
+        runs = np.arange(first_run, min(first_run + RUNS, len(q)))
+        start, carried = (q[runs, 0], qd[runs, 0]), runner.carried(len(runs), dt)
+        for first in range(0, steps, STEPS):
+            count = min(STEPS, steps - first)
+            block_q, block_qd = (np.full((len(x), count + 1, x.shape[1]), np.nan) for x in start)
+            block_q[:, 0], block_qd[:, 0] = start
+            codes, taken = runner.follow(block_q, block_qd, tau[runs], dt, tolerance, 1, carried)
+            ended[runs] = reasons(runner.tree, block_q, block_qd, codes, dt, tolerance, first)
+            evaluations += taken
+            kept = np.arange(-first % every, count + 1, every)
+            for path, block in ((q, block_q), (qd, block_qd)):
+                path[runs[:, None], (first + kept) // every] = block[:, kept]
+            alive = np.array([why is None for why in ended[runs]], bool)
+            runs, start = runs[alive], (block_q[alive, -1], block_qd[alive, -1])
+            carried = np.roll(carried[alive], 2, axis=1)
+    return ended, evaluations
+
+
+def reasons(
+    tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance: float, first: int = 0
+) -> Array:
     """Why each run ended, (runs,) of str or None; its states are NaN from where Mbar was singular.
 
     q, qd: the paths (runs, records, nq and nv), of each step where Mbar may be singular; codes (runs, 2): why
-    the compiled loop ended each, 0: it did not, and after how many steps.
+    the compiled loop ended each, 0: it did not, and after how many steps. first: the number of the first
+    step.
     """
     ended = np.full(len(codes), None, dtype=object)
     if tree.never_singular and not codes.any():
@@ -146,6 +175,7 @@ def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance:
         DIVERGED: "the motion diverges: its numbers overflow within a step, or a hinge passes 2^49 rad",
         NEWTON: f"Newton's method does not find the stages of a step of {dt:g} s",
         SMALL: f"the tolerance of {tolerance:g} would need steps below 1e-9 dt",
+        MANY: f"the tolerance of {tolerance:g} takes more than {MOST_EVALUATIONS:.0e} evaluations",
     }
     for run, (code, step) in enumerate(codes.tolist()):
         why = words.get(code)
@@ -153,7 +183,7 @@ def reasons(tree: Tree, q: Array, qd: Array, codes: Array, dt: float, tolerance:
             step, why = place
             q[run, step + 1 :] = qd[run, step + 1 :] = np.nan
         if why:
-            ended[run] = f"at t = {step * dt:g} s: {why}"
+            ended[run] = f"at t = {(first + step) * dt:g} s: {why}"
     return ended
 
 

@@ -10,7 +10,7 @@ from tmt import Tree
 from tmt.compiled import Evaluator
 from tmt.derivation import composite
 from tmt.derivation.method import acceleration
-from tmt.derivation.vectors import arctan, cos, sin, sqrt
+from tmt.derivation.vectors import cos, sign, sin, sqrt
 
 from ..robots.case import Case
 from . import Course, Engine, EngineRecord, Method, Motion, Prepared
@@ -63,8 +63,10 @@ class HeyokaDynamics(ScipyDynamics):
 def integrator(tree: Tree, tau: tuple[float, ...], tolerance: float) -> Any:
     import heyoka
 
-    for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt), (arctan, heyoka.atan)):
+    for function, own in ((sin, heyoka.sin), (cos, heyoka.cos), (sqrt, heyoka.sqrt)):
         function.register(heyoka.expression, own)
+    one = heyoka.expression(1.0)
+    sign.register(heyoka.expression, lambda x: heyoka.select(heyoka.lt(x, 0.0), one * -1.0, one))
     sizes = {"q": tree.coordinates.nq, "qd": tree.coordinates.nv}
     q, qd = ([heyoka.make_vars(f"{name}{i}") for i in range(size)] for name, size in sizes.items())
     qdd = acceleration(tree, q, qd, list(tau), composite.mass_matrix_and_bias)

@@ -15,7 +15,7 @@ from tmt.model.tree import GAINS
 
 from ..core.finding import Finding
 from ..core.words import capital, some_of
-from .actuators import Controller, Drive, controller
+from .actuators import Controller, Drive
 from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates as Coordinates
 from .coordinates import rates_at as rates_at
@@ -57,7 +57,7 @@ class Robot:
     # (answers by item, dynamics by engine) -> Findings about the printed results
     remarks: Callable[[Mapping[str, Any], Mapping[str, Any]], list[Finding]] | None = None
     features: tuple[Feature, ...] = ()  # of a file; its numbers are those that MuJoCo compiled
-    drive: Drive = field(default_factory=Drive)  # its actuators
+    drive: Drive | None = None  # its actuators
     stated_in: str = ""  # another file, the solution, with the numbers for this one; "": none
     features_stated: tuple[Feature, ...] = ()  # of the solution, as `features`
     own: tuple[str, ...] = ()  # functions of a user's equations, "mass_matrix" ...; (): tmt's are compared
@@ -226,13 +226,11 @@ class Case:
     @cached_property
     def controller(self) -> Controller | None:
         """The robot's own actuators, if they act."""
-        if self.scene.torque != "servos":
+        if self.scene.torque != "servos" or self.robot.drive is None:
             return None
-        coordinates = self.robot.coordinates
-        q = self.posture[coordinates.places.first_positions]
-        targets = np.broadcast_to(self.scene.targets, coordinates.nv)
-        moved = coordinates.from_degrees(targets, positions=False)
-        return controller(self.robot.drive, self.scene.posture, q, moved)
+        targets = np.broadcast_to(self.scene.targets, self.robot.coordinates.nv)
+        moved = self.robot.coordinates.from_degrees(targets, positions=False)
+        return self.robot.drive.controller(self.scene.posture, self.posture, moved)
 
     @cached_property
     def unlocked_tree(self) -> tmt.Tree:

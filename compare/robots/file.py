@@ -12,7 +12,7 @@ from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minut
 from tmt.model.tree import GAINS
 
 from ..core.finding import Finding
-from .actuators import Drive, controller
+from .actuators import Drive
 from .case import Range, Robot
 from .coordinates import Coordinates, fastest_rates, free_joints
 from .printed import Feature
@@ -45,7 +45,7 @@ class RobotFile:
     ranges: tuple[Range, ...]  # of each joint; a ball's of the angle of its turn
     integrator: str  # by MuJoCo's name
     dt: float  # s
-    drive: Drive  # its actuators; controls by the names of `keyframes`
+    drive: Drive | None  # its actuators; controls by the names of `keyframes`
 
 
 def robot_of(file: RobotFile, shown: str) -> Robot:
@@ -53,7 +53,7 @@ def robot_of(file: RobotFile, shown: str) -> Robot:
     keys = names_of_keys(file)
     positions = named_positions(file, keys)
     start = next(name for name in positions if name != "qpos0" or len(positions) == 1)
-    drive = replace(file.drive, controls={keys[name]: u for name, u in file.drive.controls.items()})
+    drive = file.drive and file.drive.called(keys)
     return Robot(
         name=file.name or Path(shown).stem or shown,
         mjcf=file.path or Path(shown),
@@ -86,13 +86,10 @@ def not_compared(file: RobotFile, solution: RobotFile, names: Sequence[str]) -> 
     return [Finding("remarks", "not_compared", values)] if limits or actuators else []
 
 
-def laws_of(drive: Drive, joints: Mapping[str, str]) -> dict[tuple[str | tuple[str, ...], ...], str]:
-    """The names of actuators by joint, gear, law and range of control. joints: other names of joints."""
-    laws: dict[tuple[str | tuple[str, ...], ...], str] = {}
-    for actuator in drive.actuators:
-        numbers = sorted(actuator.moment or ()), actuator.gain, actuator.bias, actuator.control_range
-        laws[joints.get(actuator.joint, actuator.joint), *map(rounded, numbers)] = actuator.name
-    return laws
+def laws_of(drive: Drive | None, joints: Mapping[str, str]) -> dict[tuple[str, tuple[str, ...]], str]:
+    """The names of actuators by joint and numbers. joints: other names of joints."""
+    laws = drive.laws.items() if drive else ()
+    return {(joints.get(joint, joint), rounded(numbers)): name for name, (joint, numbers) in laws}
 
 
 def rounded(numbers: Sequence[float] | None) -> tuple[str, ...]:
@@ -127,7 +124,7 @@ def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tupl
     return positions
 
 
-def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive) -> tuple[Scene, ...]:
+def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive | None) -> tuple[Scene, ...]:
     """The scenes of a robot: held, let go, with damping too; a free body is thrown; then servo_scenes.
 
     Only agreement is expected, as long as rounding allows. A robot that would stay at rest gets an initial
@@ -160,7 +157,7 @@ def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive) -> tu
     scenes.append(let_go(how, tags=tags))
     longest = DURATION / coarsest(tree, inverse, dt, damping)
     scenes.append(let_go(f"{how}, damped", damping=damping, tags=("own", "full only"), dt=longest))
-    return (*scenes, *servo_scenes(tree, start, q, dt, drive, inverse))
+    return (*scenes, *(servo_scenes(tree, start, q, dt, drive, inverse) if drive else ()))
 
 
 def servo_scenes(tree: Tree, start: str, q: Array, dt: float, drive: Drive, inverse: Array) -> list[Scene]:
@@ -169,7 +166,7 @@ def servo_scenes(tree: Tree, start: str, q: Array, dt: float, drive: Drive, inve
     A robot with a free body has no gravity in them. If a servo is too fast for MAX_STEPS_OF_A_FILE, methods
     are not compared.
     """
-    acting = controller(drive, start, np.array(q)[tree.coordinates.first_positions])
+    acting = drive.controller(start, np.array(q))
     if not acting.position_gain.any():
         return []
     driven = replace(tree, **{name: getattr(acting, name) for name in GAINS})

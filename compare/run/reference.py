@@ -19,7 +19,6 @@ from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import aside, own_object, raised_in
 from ..experiments.setup import Request
 from ..robots import Robot
-from ..robots.actuators import Drive
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import not_compared, robot_of, robot_of_solution
@@ -104,7 +103,7 @@ class Compared(NamedTuple):
         if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
             raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
         if asked["controls"]:
-            names = [actuator.name for actuator in self.reading.drive.actuators]
+            names = self.reading.drive.names if self.reading.drive else ()
             asked["controls"] = read_controls(asked["controls"], names, of_step)
             if options.scenes:
                 raise ModelError("--controls and --scenes both say what the robot does")
@@ -165,7 +164,7 @@ def with_solution(source: Source, shown: str, asked: str, solution: str) -> Comp
     placement = placed(replace(stated.tree, joint_names=names), reading.tree)
     otherwise = placement.remarks() + of_welded(source) + not_compared(reading, stated, names)
     # its actuators do not act: those of the file may differ
-    stated = replace(stated, tree=placement.tree, drive=Drive())
+    stated = replace(stated, tree=placement.tree, drive=None)
     robot = robot_of_solution(reading, shown, stated, name)
     reference = reference._replace(source=name, renamed=renamed, otherwise=tuple(map(say, otherwise)))
     return Compared(reference, robot, engine(reading, stated), reading)

@@ -140,6 +140,25 @@ def test_a_step_has_the_derivative_of_the_closed_form(integrator, by):
         assert np.allclose(found[0], A, atol=1e-9) and np.allclose(found[1], B, atol=1e-9)
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "RK4"])
+def test_differences_are_those_of_plain_steps_from_states_beside_one_or_two(integrator):
+    """With an eps so large that both are far apart."""
+    model, data = plain("gripper", 0.004, integrator)
+    start, eps = state_of(model, data), 0.05
+
+    def after(by):
+        mujoco.mj_setState(model, data, start, STATE)
+        data.qpos[0] += by
+        mujoco.mj_step(model, data)
+        return np.r_[data.qpos, data.qvel]
+
+    ahead, here, behind = after(eps), after(0.0), after(-eps)
+    stepper = Stepper(model, 0.004, integrator)
+    for centred, exact in ((True, (ahead - behind) / (2.0 * eps)), (False, (ahead - here) / eps)):
+        A, _ = stepper.derivative(start, eps, centred)
+        assert np.allclose(A[: len(exact), 0], exact, atol=1e-10)
+
+
 def test_differences_are_one_sided_at_the_end_of_a_range():
     """A muscle's activation is never below 0, a control never above its range."""
     muscle = '<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/><motor joint="j" ctrlrange="-1 1"/>'

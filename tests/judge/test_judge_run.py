@@ -22,7 +22,7 @@ from compare.judge.run import (
     required_time,
 )
 from compare.robots import Robot
-from compare.robots.actuators import Actuator, Drive
+from compare.robots.actuators import Controller
 from compare.robots.arm import ARM
 from compare.robots.coordinates import rates_at
 from compare.robots.file import robot_of
@@ -109,7 +109,9 @@ def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_ha
 @pytest.mark.parametrize("lifted, ends", [(1e300, None), (1e308, 0.5)])
 def test_a_run_whose_energy_is_not_a_number_has_diverged(lifted, ends):
     """Lifted by the force that balances its weight: the energy less the work is 0, and inf - inf."""
-    case = Robot("slide", None, alone("slide", gravity=(0.0, 0.0, -10.0)), {}, ()).case("held", torque=(20.0,))
+    case = Robot("slide", None, alone("slide", gravity=(0.0, 0.0, -10.0)), {}, ()).case(
+        "held", torque=(20.0,)
+    )
     q = np.array([[0.0], [lifted]])
     assert diverged_at(case, T, q, np.zeros((2, 1))) == ends
 
@@ -117,8 +119,13 @@ def test_a_run_whose_energy_is_not_a_number_has_diverged(lifted, ends):
 @pytest.mark.parametrize("start", [0.0, 0.3, -0.7])
 def test_a_servo_gives_no_more_than_it_has_stored(start):
     """At most 50 (0.2)^2 / 2 = 1 J beyond the 1 J that it has given when it is at its target."""
-    servo = Actuator("servo", "joint", (1.0,), gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, 0.0))
-    robot = Robot("ball", None, alone("slide"), {}, (), drive=Drive((servo,)))
+
+    class Servo:
+        def controller(self, posture, q, targets):
+            u = float((q + targets)[0])
+            return Controller((u,), (), np.array([50.0 * u]), np.array([[50.0]]), np.array([[0.0]]))
+
+    robot = Robot("ball", None, alone("slide"), {}, (), drive=Servo())
     case = robot.case("step", posture=(start,), torque="servos", targets=0.2)
     for share, ends in ENDS:
         speeds = np.array([[0.0], [np.sqrt(1.0 + share)]])  # of 2 kg

@@ -107,7 +107,11 @@ def test_energies_sum_weight_springs_and_motion():
     hinge = [5.0 * (0.4 + 0.3) ** 2, 5.0 * (1.0 + 0.3) ** 2]
     stored = heights + (np.array(slide) + hinge + 3.0 * 2.0 * np.pi**2) / 2.0
     assert np.allclose(OF.potential_energy, stored, rtol=1e-13)
-    moving = summed(lambda b, s: TREE.mass[b] * (MOVES[b] @ np.abs(QD[s])) ** 2 + LARGEST[b] * (TURNS[b] @ np.abs(QD[s])) ** 2)
+    moving = summed(
+        lambda b, s: (
+            TREE.mass[b] * (MOVES[b] @ np.abs(QD[s])) ** 2 + LARGEST[b] * (TURNS[b] @ np.abs(QD[s])) ** 2
+        )
+    )
     assert np.allclose(OF.energy, stored + (moving + np.array(TREE.armature) @ QD.T**2) / 2.0, rtol=1e-13)
 
 
@@ -129,7 +133,9 @@ def test_rates_of_forces_sum_what_a_movement_changes_in_each_term():
     def by_speed(b, s):
         S, V, w = moving_of(b, s)
         of_point = TREE.mass[b] * (S * np.outer(MOVES[b], MOVES[b]) + w * np.outer(MOVES[b], TURNS[b]))
-        of_turn = LARGEST[b] * S * np.outer(TURNS[b], TURNS[b]) + TREE.mass[b] * V * np.outer(TURNS[b], SLIDES[b])
+        of_turn = LARGEST[b] * S * np.outer(TURNS[b], TURNS[b]) + TREE.mass[b] * V * np.outer(
+            TURNS[b], SLIDES[b]
+        )
         return 2.0 * (of_point + of_turn)
 
     by_q, by_qd = OF.force_rates(qdd)
@@ -158,8 +164,8 @@ def test_derivatives_of_accelerations_go_through_the_inverse():
     by_q, by_qd = (part[0] for part in alone.force_rates(sizes))
     found = alone.derivatives(1.0, qdd[None], by)
     assert np.allclose(found[3][0], by_q, rtol=1e-12) and np.allclose(found[4][0], by_qd, rtol=1e-12)
-    for scale, right, slope in zip(found[:3], (by_q, by_qd, np.eye(6)), by[:3]):
-        assert np.allclose(scale[0], inverse @ (right + factored @ np.abs(slope[0])), rtol=1e-12)
+    for size, right, slope in zip(found[:3], (by_q, by_qd, np.eye(6)), by[:3]):
+        assert np.allclose(size[0], inverse @ (right + factored @ np.abs(slope[0])), rtol=1e-12)
 
 
 @pytest.mark.parametrize("dt", [0.01, 0.1])

@@ -19,6 +19,8 @@ from tmt.methods import METHODS
 
 REST = np.zeros(3)
 TOOL = dataclasses.replace(tmt.ARM, site_names=["tool"], site_joint=[2])
+ALIKE = dataclasses.replace(tmt.ARM, site_names=["a b", "a_b", "a+c"], site_joint=[2, 1, 0])
+LARGE = dataclasses.replace(tmt.ARM, gravity=(0.0, 0.0, 2e40))
 
 
 def moved(dt=0.1, steps=10, method="rk4", q=REST, qd=REST, tau=REST, **more):
@@ -50,6 +52,8 @@ EQUATIONS = [  # arguments of equations, and the word
     ({"language": "fortran"}, "language"), ({"language": None}, "language"), ({"quantities": []}, "quantity"),
     ({"quantities": ["mass"]}, "mass"), ({"quantities": "energie"}, "energie"), ({"model": "arm"}, "model"),
     *(({"name": name}, "name") for name in ("2", "_x", "while", "energy", None)),
+    ({"model": ALIKE, "quantities": ["frame_pose:a b", "frame_pose:a_b"]}, "frame_pose_a_b"),
+    ({"model": LARGE, "quantities": ["bias"], "single": True}, "single precision"),
     ({"language": "python", "single": True}, "single"), ({"language": "latex", "quantities": ["jacobians"]}, "jacobians"),
 ]  # fmt: skip
 SAID = [  # calls that are refused, and a word of what is said

@@ -15,6 +15,7 @@ import tmt
 from tmt.derivation.quantities import PLAIN, QUANTITIES
 from tmt.exact.many import Pairs, exact_of_many
 from tmt.export import c
+from tmt.export.parameters import Parameters
 
 HAS_C = bool(shutil.which("gcc"))
 
@@ -170,3 +171,30 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
 def test_what_is_no_parameter(words, quantity, why):
     with pytest.raises(ValueError, match=why):
         tmt.equations(tmt.ARM, "c", [quantity], parameters=words)
+
+
+def test_a_body_keeps_its_own_frame_where_a_site_of_its_name_is_on_another_joint():
+    """Of the names of sites that become one the file has either; numbers of the file are those of single precision."""
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    place = {
+        "site_names": ["forearm", "a b", "a_b"],
+        "site_offset": [(1.0, 2.0, 3.0)] * 3,
+        "site_turn": [turn] * 3,
+    }
+    for joint in (-1, 0, 1, 2):
+        tree = replace(tmt.ARM, site_joint=[joint] * 3, **place)
+        chosen = Parameters(tree, ["forearm.com"]).values["forearm_com"]
+        assert chosen == (
+            tmt.ARM.com[1] if joint != 2 else tuple(turn.T @ (tmt.ARM.com[1] - np.array([1.0, 2.0, 3.0])))
+        )
+        assert np.allclose(
+            module(tree, "frame_pose:a b")["frame_pose_a_b"](np.zeros(3))[:, 3],
+            tmt.frame("a_b", np.zeros(3), model=tree)[0],
+        )
+
+
+def test_numbers_of_single_precision_end_where_floats_do():
+    inside, beyond = (replace(tmt.ARM, armature=(size, 0.0, 0.0)) for size in (3.3e38, 3.5e38))
+    assert "3.3e+38f" in tmt.equations(inside, "c", ["mass_matrix"], single=True)
+    with pytest.raises(ValueError, match="single precision"):
+        tmt.equations(beyond, "c", ["mass_matrix"], single=True)

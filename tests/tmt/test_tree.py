@@ -26,7 +26,7 @@ REFUSED = [  # changes of the arm, and a word of what is said
     ({"inertia": ([[1, 1e-9, 0], [0, 1, 0], [0, 0, 1]], np.eye(3))}, "symmetric"),
     ({"mass": (1.9, 0), "inertia": (np.eye(3), np.zeros((3, 3)))}, "'gamma'"),
     ({"mass": (1e-320, 1e-320), "inertia": np.zeros((2, 3, 3))}, "doubles"),
-    ({"joint_names": ("a", "b", "a")}, "names"), ({"colour": 3}, "'colour'"),
+    ({"joint_names": ("a", "b", "a")}, "names"),
     ({"position_gain": np.zeros((2, 3))}, "position_gain"),
 ]  # fmt: skip
 OF_KINDS = [  # changes of a slide on a ball
@@ -91,16 +91,11 @@ def test_a_body_with_inertia_for_every_hinge_is_never_singular(rng):
         assert np.linalg.cond(tmt.mass_matrix(rng.uniform(-3, 3, (50, len(tree.parent))), tree)).max() < 1e9
 
 
-def test_former_names_of_fields_are_accepted_and_deprecated():
-    values = dict(vars(tmt.ARM))
-    values["hinge_names"] = values.pop("joint_names")
-    with pytest.warns(DeprecationWarning, match="joint_names"):
-        assert tmt.Tree(**values) == tmt.ARM
-    with pytest.warns(DeprecationWarning, match="body_joint"):
-        assert tmt.ARM.body_hinge == tmt.ARM.body_joint
-    with pytest.warns(DeprecationWarning):
-        renamed = dataclasses.replace(tmt.ARM, hinge_names=("a", "b", "c"))
-    assert renamed.joint_names == ("a", "b", "c")
+@pytest.mark.parametrize("name", ["colour", "hinge_names", "body_hinge"])
+def test_a_tree_has_its_own_fields_alone(name):
+    with pytest.raises(TypeError, match=name):
+        dataclasses.replace(tmt.ARM, **{name: (1, 2)})
+    assert not hasattr(tmt.ARM, name)
 
 
 def test_a_tree_is_shown_in_one_short_line_and_stated_by_all_its_numbers(rng):

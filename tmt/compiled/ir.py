@@ -172,14 +172,6 @@ class Code:
         self.intrinsics.add(f"declare {kind} @{name}({', '.join([kind] * len(values))})")
         return self.call(name, *values, kind=kind)
 
-    def library(self, name: str, x: Value) -> Value:
-        self.intrinsics.add(f"declare double @{name}(double) nounwind memory(none)")
-        result = x
-        for l in range(width_of(x.kind)):
-            y = self.call(name, x.lane(l), kind=DOUBLE)
-            result = y if x.kind == DOUBLE else result.with_lane(l, y)
-        return result
-
     def call(self, name: str, *values: Value, kind: str = "void") -> Value:
         text = f"call {kind} @{name}({', '.join(f'{v.kind} {v.name}' for v in values)})"
         if kind != "void":

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from tmt.methods import METHODS, method_named
-from tmt.methods.stepping import Method
+from tmt.methods.stepping import MOST_EVALUATIONS, Method
 from tmt.model.tree import Tree, checked_model
 
 from .cores import cores, in_threads
@@ -20,7 +20,7 @@ Array = np.ndarray
 Ended = tuple[Array, int]  # why each run ended, and the evaluations
 Call = Callable[[], None]
 DIRECT = ctypes.c_void_p
-ARGUMENTS = [DIRECT, DIRECT, DIRECT, ctypes.c_double, ctypes.c_double, DIRECT, *[ctypes.c_int64] * 3]
+ARGUMENTS = [*[DIRECT] * 3, *[ctypes.c_double] * 2, *[DIRECT] * 3, *[ctypes.c_int64] * 3]
 runners: dict[tuple[int, str], "Runner"] = {}
 
 
@@ -45,16 +45,32 @@ class Runner:
         return self.functions[width]
 
     def call(self, width: int, arrays: Sequence[Array], dt: float, tolerance: float, every: int = 1) -> Call:
-        """A call that fills arrays q, qd, tau, info, see runs.py: they must live as long as it."""
-        q, qd, tau, info = map(address, arrays)
-        sizes = every, arrays[0].shape[1], len(arrays[0])
-        return partial(self.compiled(width), q, qd, tau, dt, tolerance, info, *sizes)
+        """A call that fills arrays q, qd, tau, info and may be given carried and stop, see runs.py."""
+        q, qd, tau, info, *more = arrays
+        carried, stop = more or (self.carried(len(q), dt), np.zeros(1, np.int64))
+        held = q, qd, tau, info, carried, stop
+        of_q, of_qd, of_tau, *others = map(address, held)
+        arguments = of_q, of_qd, of_tau, dt, tolerance, *others, every, q.shape[1], len(q)
+        function = self.compiled(width)
 
-    def follow(self, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int) -> Ended:
-        """Fill the paths, which hold each `every`-th state alone.
+        def call(_: object = held) -> None:  # the arrays live as long as it
+            function(*arguments)
+
+        return call
+
+    @staticmethod
+    def carried(runs: int, dt: float) -> Array:
+        """What an adaptive method begins with, see runs.py."""
+        return np.tile([dt / 8.0, MOST_EVALUATIONS, np.nan, np.nan], (runs, 1))
+
+    def follow(
+        self, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int,
+        carried: Array | None = None,
+    ) -> Ended:  # fmt: skip
+        """Fill the paths, which hold each `every`-th state alone; carried: see runs.py.
 
         Returns why each run ended (0: it did not) and after how many steps, (runs, 2); and the evaluations.
-        Where a run ended, its path is NaN from there on.
+        Where a run ended, its path is NaN from there on. An interruption (Ctrl-C) ends all runs.
         """
         from .machine import lanes
 
@@ -63,14 +79,17 @@ class Runner:
         is_uniform = not (self.stepping.adaptive or self.stepping.solves_stages)
         evaluations = steps * count * self.stepping.stages
         width = lanes() if is_uniform and count >= lanes() and evaluations > WIDE else 1
-        info = np.zeros((count, 3), np.int64)
+        info, stop = np.zeros((count, 3), np.int64), np.zeros(1, np.int64)
+        carried = self.carried(count, dt) if carried is None else carried
 
         def follow_some(part: slice) -> None:
-            self.call(width, [array[part] for array in (q, qd, tau, info)], dt, tolerance, every)()
+            arrays = [array[part] for array in (q, qd, tau, info, carried)]
+            self.call(width, [*arrays, stop], dt, tolerance, every)()
 
         threads = cores() if count > width and evaluations > SPREAD else 1
         parts = min(count // width, PIECES * threads) if threads > 1 else 1
-        in_threads(follow_some, count, parts, width, threads)
+        is_long = evaluations > SPREAD or not is_uniform
+        in_threads(follow_some, count, parts, width, threads, partial(stop.fill, 1) if is_long else None)
         return self.outcome(q, qd, info, every)
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:

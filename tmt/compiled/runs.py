@@ -1,8 +1,10 @@
 """Motions in compiled code: the loops over runs, records and steps around the traced step of a method.
 
-run(q, qd, tau, dt, tolerance, info, every, records, runs): paths q (runs, records, nq) and qd (runs, records,
-nv) are filled from their first states, of which each `every`-th is kept; tau (runs, nv). info (runs, 3) of
-whole numbers: why each run ended, 0 where it did not, after how many steps, and how many evaluations.
+run(q, qd, tau, dt, tolerance, info, carried, stop, every, records, runs): paths q (runs, records, nq) and qd
+(runs, records, nv) are filled from their first states, of which each `every`-th is kept; tau (runs, nv). info
+(runs, 3) of whole numbers: why each run ended, 0 where it did not, after how many steps, and how many
+evaluations. carried (runs, 4), of an adaptive method: the step that it tries first, s, and how many
+evaluations are left; then both at the end. stop: a whole number, which ends all runs once it is not 0.
 """
 
 from collections.abc import Callable
@@ -12,7 +14,7 @@ from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
 from tmt.derivation.vectors import Values, minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import DIVERGED, NEWTON, SMALL, Joints
+from tmt.methods.stepping import DIVERGED, MANY, NEWTON, SMALL, Joints
 from tmt.model.tree import Tree
 
 from . import forms, linear
@@ -40,7 +42,9 @@ class Step:
         self.nq, self.n = tree.coordinates.nq, tree.coordinates.nv
         self.joints: Joints = tree.coordinates if tree.coordinates.balls else FLAT
         self.functions: list[Code] = []
-        self.wanted: Variable  # of an adaptive method: the step that its tolerance wants
+        # of an adaptive method: the step that its tolerance wants, and how many evaluations are left
+        self.wanted: Variable
+        self.left: Variable
 
     def add(self, traced: Traced, width: int, inline: bool = False) -> None:
         self.functions += functions(traced, width, inline)
@@ -89,16 +93,21 @@ class Step:
             with code.loop(2**62) as loop:
                 loop.leave(left.get().compare("le", 0.0))
                 loop.leave(why.get().compare("ne", 0))
+                loop.leave(is_stopped(code))
                 pieces = (left.get() / wanted.get()).function("ceil")
                 h = left.get() / pieces
                 state.store(h, nq + 2 * n)
                 code.call("attempt", state, result)
                 evaluations.set(evaluations.get() + self.stepping.stages)
+                self.left.set(self.left.get() - self.stepping.stages)
                 e5 = squares(state, result, nq + n, scales, code["tolerance"])
                 e3 = squares(state, result, nq + 3 * n, scales, code["tolerance"])
                 root = (2.0 * n * (e5 + 0.01 * e3)).function("sqrt")
-                error = e5.compare("gt", 0.0).choose(e5 / root, 0.0)
-                with code.when(error.compare("lt", 1.0)):  # it is accepted
+                is_number = (e5 + e3).compare("lt", float("inf"))
+                share = e5.compare("eq", 0.0).choose(code.number(0.0), e5 / root)
+                error = is_number.choose(share, float("inf"))
+                is_accepted, flaw = error.compare("lt", 1.0), unsound(code, self.tree, result, 1)
+                with code.when(is_accepted):
                     for k in code.each(nq + n):
                         state.store(result.load(k), k)
                     left.set(pieces.compare("gt", 1.0).choose(left.get() - h, 0.0))
@@ -107,9 +116,10 @@ class Step:
                 factor = factor.compare("gt", SHRINKING).choose(factor, SHRINKING)
                 factor = factor.compare("lt", GROWTH).choose(factor, GROWTH)
                 wanted.set(h * factor)
-                flaw = unsound(code, self.tree, state, 1)
-                short = h.compare("gt", dt * SHORTEST_STEP).choose(code.number(0, INDEX), SMALL)
-                why.set(flaw.compare("ne", 0).choose(flaw, short))
+                short = flaw.compare("ne", 0).choose(flaw, SMALL)
+                ends = h.compare("gt", dt * SHORTEST_STEP).choose(code.number(0, INDEX), short)
+                ends = self.left.get().compare("gt", 0.0).choose(ends, MANY)
+                why.set(flaw.compare("ne", 0).bits("and", is_accepted).choose(flaw, ends))
             for k in code.each(nq + n):
                 new.store(state.load(k), k)
             state.store(dt, nq + 2 * n)
@@ -225,7 +235,8 @@ def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
 
 
 def run(step: Step, advance: Advance) -> Code:
-    names = {"q": POINTER, "qd": POINTER, "tau": POINTER, "dt": DOUBLE, "tolerance": DOUBLE, "info": POINTER}
+    names = {"q": POINTER, "qd": POINTER, "tau": POINTER, "dt": DOUBLE, "tolerance": DOUBLE}
+    names |= dict.fromkeys(("info", "carried", "stop"), POINTER)
     code = Code("run", names | dict.fromkeys(("every", "records", "runs"), INDEX))
     nq, n, width = step.nq, step.n, step.width
     kind, flags = wide(DOUBLE, width), wide(FLAG, width)
@@ -235,7 +246,9 @@ def run(step: Step, advance: Advance) -> Code:
     with code.loop(code["runs"], width) as runs:
         rows = linear.rows_of(runs.index, code["runs"], width)
         alive, evaluations = Variable(code, flags, True), Variable(code, INDEX, 0)
-        step.wanted = Variable(code, DOUBLE, code["dt"] / 8.0)
+        step.wanted, step.left = (
+            Variable(code, DOUBLE, code["carried"].load(runs.index * 4 + k)) for k in (0, 1)
+        )
         for lane, run in enumerate(rows):
             for name, size, first in paths:
                 for k in code.each(size):
@@ -255,7 +268,9 @@ def run(step: Step, advance: Advance) -> Code:
                             info.store(records.index * code["every"] + steps.index, run * 3 + 1)
                     alive.set(alive.get().bits("and", ends.negated()))
                 steps.leave(linear.any_of(alive.get(), width).negated())
+                steps.leave(is_stopped(code))
             records.leave(linear.any_of(alive.get(), width).negated())
+            records.leave(is_stopped(code))
             for lane, run in enumerate(rows):
                 for name, size, first in paths:
                     place = (run * code["records"] + records.index + 1) * size
@@ -263,8 +278,16 @@ def run(step: Step, advance: Advance) -> Code:
                         code[name].store(state.load((k + first) * width + lane), place + k)
         if width == 1:
             info.store(evaluations.get(), runs.index * 3 + 2)
+            for k, variable in ((2, step.wanted), (3, step.left)):
+                code["carried"].store(variable.get(), runs.index * 4 + k)
+        runs.leave(is_stopped(code))
     code.give_back()
     return code
+
+
+def is_stopped(code: Code) -> Value:
+    """Read anew each time: another thread writes it."""
+    return code.put(INDEX, f"load volatile {INDEX}, ptr {code['stop'].name}, align 8").compare("ne", 0)
 
 
 def unsound(code: Code, tree: Tree, state: Value, width: int) -> Value:

@@ -1,15 +1,13 @@
 """Object files on disk: $TMT_CACHE, else $XDG_CACHE_HOME/tmt, else ~/.cache/tmt.
 
 The name of a file is the hash of all that its machine code depends on: tmt's sources as imported, the
-versions of llvmlite and LLVM, the processor, the tree and what is compiled for it. What a file holds is run
-only if it is the user's own, nobody else can write to it, and it was written under this name: so it does not
-matter who may write to the folder. With any other file, without a folder or on a full disk, the code is
-compiled anew: it only costs time. To clear the folder is to delete it.
+versions of llvmlite and LLVM, the processor, the tree and what is compiled for it. With a file that is not
+what was written under this name, without a folder or on a full disk, the code is compiled anew: it only costs
+time. To clear the folder is to delete it.
 """
 
 import hashlib
 import os
-import stat
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -23,8 +21,6 @@ from .machine import Library, object_code, versions
 from .sources import own_sources
 
 DIGEST = 32  # bytes of a SHA-256, before the object code
-# neither a link is followed nor a pipe waited for
-READING = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
 
 
 def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Library:
@@ -38,13 +34,14 @@ def library(source: Callable[[], str], *what: Tree | Method | str | int) -> Libr
     if len(parts) < len(words) or folder is None:
         return Library(source())
     name = hashlib.sha256("\n".join(parts).encode()).hexdigest()[:32]
-    path, code = folder / f"{name}.o", None
+    path = folder / f"{name}.o"
     with suppress(OSError):
-        code = read(path)
-    if code is None:
-        code = object_code(source())
-        with suppress(OSError):
-            write_aside(path, digest(path, code) + code)
+        content = path.read_bytes()
+        if content[:DIGEST] == digest(path, content[DIGEST:]):
+            return Library(code=content[DIGEST:])
+    code = object_code(source())
+    with suppress(OSError):
+        write_aside(path, digest(path, code) + code)
     return Library(code=code)
 
 
@@ -56,22 +53,6 @@ def word_of(value: object) -> str | None:
     if is_of_tmt and isinstance(value, Tree | Method) and is_dataclass(value):
         return f"{type(value).__qualname__}({stated(value)})"
     return None
-
-
-def read(path: Path) -> bytes | None:
-    """The object code of a file; None where others may have written it, or it is not what was written."""
-    with open(os.open(path, READING), "rb") as file:
-        content = file.read() if is_own(os.fstat(file.fileno())) else b""
-    written, code = content[:DIGEST], content[DIGEST:]
-    return code if written == digest(path, code) else None
-
-
-def is_own(about: os.stat_result) -> bool:
-    """Whether a file is one that the user alone can have written; where there are no users, any."""
-    if not hasattr(os, "geteuid"):
-        return True
-    is_shared = about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
-    return stat.S_ISREG(about.st_mode) and about.st_uid == os.geteuid() and not is_shared
 
 
 def digest(path: Path, code: bytes) -> bytes:

@@ -188,8 +188,9 @@ class Steps:
             return {i: x.fma(y, value(other) if name == "+" else -value(other))}
         if name == "sqrt":
             return {i: value(arguments[0]).function("sqrt")}
-        if name == "arctan":
-            return {i: code.library("atan", value(arguments[0]))}
+        if name == "sign":
+            x = value(arguments[0])
+            return {i: x.compare("lt", 0.0).choose(x.like(-1.0), 1.0)}
         return {i: FOLD[name](*map(value, arguments))}
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from numbers import Real
 from typing import Any
 
-from tmt.derivation.vectors import Scalar, arctan, cos, sin, sqrt
+from tmt.derivation.vectors import Scalar, cos, sign, sin, sqrt
 
 Function = Callable[[Scalar], Scalar]
 
@@ -24,7 +24,7 @@ def folded(of_float: Function, function: Function) -> Function:
 FOLD: dict[str, Callable[..., Scalar]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": operator.truediv, "neg": operator.neg,
     "sin": folded(math.sin, sin), "cos": folded(math.cos, cos), "sqrt": folded(math.sqrt, sqrt),
-    "arctan": folded(math.atan, arctan),
+    "sign": sign,
 }  # fmt: skip
 LEAVES = ("input", "number")
 
@@ -211,5 +211,5 @@ class Expression:
 
 
 SCALARS = (Expression, float, int)
-for name, function in (("sin", sin), ("cos", cos), ("sqrt", sqrt), ("arctan", arctan)):
+for name, function in (("sin", sin), ("cos", cos), ("sqrt", sqrt), ("sign", sign)):
     function.register(Expression, lambda x, name=name: x.tape.apply(name, x))

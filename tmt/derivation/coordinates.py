@@ -14,9 +14,11 @@ IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x o
 from functools import lru_cache
 from typing import NamedTuple
 
-from .vectors import Scalars, Values, Vector, arctan, cos, plus, sin, sqrt
+from .vectors import Scalars, Values, Vector, cos, plus, sign, sin, sqrt
 
 KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
+HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1
+TERMS = 17  # of the series of the arc sine, after the first: the next is below 1e-37
 TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined
 
 
@@ -92,18 +94,10 @@ class Coordinates(NamedTuple):
         movement: Values = []
         for joint in self.joints:
             if joint.kind == "ball":
-                movement += self.logarithm(product(conjugate(q0[joint.q]), q1[joint.q]))
+                movement += logarithm(product(conjugate(q0[joint.q]), q1[joint.q]))
             else:
                 movement.append(q1[joint.q.start] - q0[joint.q.start])
         return movement
-
-    @staticmethod
-    def logarithm(p: Scalars) -> Values:
-        """The movement u, |u| at most pi rad, with exponential(u) = p or -p; |p| = 1."""
-        w, x, y, z = p
-        size, length = sqrt(w * w + TINY), sqrt(x * x + y * y + z * z + TINY)
-        share = arctan(length / (1.0 + size)) * 4.0 / length * (w / size)
-        return [x * share, y * share, z * share]
 
     def tangent(self, q: Scalars, dq: Scalars) -> Values:
         """The movement that changes q by small dq, linear in dq."""
@@ -145,6 +139,27 @@ def conjugate(p: Scalars) -> Values:
 def normalized(p: Scalars) -> Values:
     length = sqrt(sum((x * x for x in p[1:]), p[0] * p[0]))
     return [x / length for x in p]
+
+
+def logarithm(p: Scalars) -> Values:
+    """The movement u, |u| at most pi rad, with exponential(u) = p / |p| or -p / |p|; of w = 0 that with p.
+
+    No root of what vanishes, so that it has derivatives everywhere: the turn is halved, sin(a / 2) = sin(a) /
+    (2 cos(a / 2)), until the series of the arc sine takes it, arcsin x = x (1 + x^2 / 6 (1 + ...)).
+    """
+    w, *v = normalized(p)
+    side = sign(w)
+    cosine, scale = w * side, side
+    for _ in range(HALVINGS):
+        cosine = sqrt((cosine + 1.0) * 0.5)
+        scale = scale * 0.5 / cosine
+    v = Vector(*v) * scale
+    square, share = v.dot(v), 1.0
+    zero = square - square  # so that quotients have the digits of its type
+    for k in range(TERMS, 0, -1):
+        ratio = (zero + (2.0 * k - 1.0) ** 2) / (2.0 * k * (2.0 * k + 1.0))
+        share = share * (square * ratio) + 1.0
+    return list(v * (share * 2.0 ** (HALVINGS + 1)))
 
 
 def exponential(u: Scalars) -> Values:

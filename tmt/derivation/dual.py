@@ -8,7 +8,7 @@ level of its own, and a number of another level is a constant to it.
 from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 
-from .vectors import Rows, Scalar, Scalars, Values, arctan, cos, sin, sqrt
+from .vectors import Rows, Scalar, Scalars, Values, cos, sign, sin, sqrt
 
 levels = count()
 
@@ -104,4 +104,4 @@ def unit_vectors(n: int) -> list[list[float]]:
 sin.register(Dual, lambda angle: angle.new(sin(angle.value), cos(angle.value) * angle.slope))
 cos.register(Dual, lambda angle: angle.new(cos(angle.value), sin(angle.value) * angle.slope * -1.0))
 sqrt.register(Dual, lambda x: x.new(root := sqrt(x.value), x.slope / (root * 2.0)))
-arctan.register(Dual, lambda x: x.new(arctan(x.value), x.slope / (1.0 + x.value * x.value)))
+sign.register(Dual, lambda x: sign(x.value))

@@ -159,10 +159,10 @@ def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> Rows:
     M: Rows = [[0.0] * n for _ in range(n)]
     for b in parts:
         moving = [k for k in range(n) if b.T[k] is not ZERO]  # the columns of all other joints are zero
-        for j in moving:
+        for count, j in enumerate(moving, 1):
             force, moment = b.mass * b.T[j], b.inertia @ b.B[j]
-            for i in moving:
-                M[i][j] = M[i][j] + (b.T[i].dot(force) + b.B[i].dot(moment))
+            for i in moving[:count]:  # the other half is the same, to the bit
+                M[i][j] = M[j][i] = M[i][j] + (b.T[i].dot(force) + b.B[i].dot(moment))
     return with_diagonal(M, armature)
 
 

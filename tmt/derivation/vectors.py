@@ -1,6 +1,6 @@
 """Vectors, rotations and linear systems over any scalar: float, array, mpf, traced or symbolic.
 
-A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints `sqrt` and `arctan`. A new
+A scalar is anything with + - * / that `sin` and `cos` know, and for ball joints `sqrt` and `sign`. A new
 scalar type registers itself with `sin.register` and so on; nothing else has to change.
 """
 
@@ -18,11 +18,16 @@ Values = list[Scalar]
 Rows = list[Values]
 Scalars = Sequence[Scalar] | NDArray[Any]
 # of a scalar of any registered type, angles in rad
-sin, cos, sqrt, arctan = map(singledispatch, (np.sin, np.cos, np.sqrt, np.arctan))
+sin, cos, sqrt = map(singledispatch, (np.sin, np.cos, np.sqrt))
 sin.register(mpmath.mpf, mpmath.sin)
 cos.register(mpmath.mpf, mpmath.cos)
 sqrt.register(mpmath.mpf, mpmath.sqrt)
-arctan.register(mpmath.mpf, mpmath.atan)
+
+
+@singledispatch
+def sign(x: Scalar) -> Scalar:
+    """-1 where x < 0, else 1: of zeros too, whatever their sign."""
+    return 1.0 - 2.0 * (x < 0.0)
 
 
 class Vector:

@@ -38,7 +38,8 @@ BESIDE = 100  # operations, as long as the rest of a step takes
 SEEN = 200  # steps by which it is seen whether a run would take more
 OPERATIONS = {
     "+": [series.ADD], "-": [series.SUBTRACT], "neg": [series.NEGATIVE], "*": [series.MULTIPLY],
-    "/": [series.DIVIDE], "sqrt": [series.ROOT], "sincos": [series.SLOPE, series.SINE, series.COSINE],
+    "/": [series.DIVIDE], "sqrt": [series.ROOT], "sign": [series.SIGN],
+    "sincos": [series.SLOPE, series.SINE, series.COSINE],
 }  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from tmt.compiled.ir import DOUBLE, INDEX, POINTER, Code, Value, Variable, modul
 
 from .pairs import add, divide, joined, multiply, root, sincos, two_sum
 
-ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, ROOT, DIVIDE, SINE, COSINE, RATE = range(11)
+ADD, SUBTRACT, NEGATIVE, SCALE, SLOPE, MULTIPLY, ROOT, DIVIDE, SINE, COSINE, RATE, SIGN = range(12)
 BESIDE = 2  # products of a sum of products side by side
 BACKWARD = list(reversed(range(BESIDE)))
 
@@ -116,6 +116,8 @@ def expansion() -> Code:
         at_first = k.compare("eq", 0)
         with code.when(when(ROOT).bits("and", at_first)):
             put(*root(ah, al))
+        with code.when(when(SIGN).bits("and", at_first)):  # all later coefficients are zero
+            put(ah.compare("lt", 0.0).choose(code.number(-1.0), 1.0), code.number(0.0))
         with code.when(when(SINE, COSINE).bits("and", at_first)):
             code.call("sincos", both, ah, al)
             place = when(SINE).choose(code.number(0, INDEX), 2)

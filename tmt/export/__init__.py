@@ -76,14 +76,15 @@ def equations(
     parameters : numbers that are further arguments of each function
         "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it;
         "payload" and then a body's name: what that carries besides. They are in the frame that is the site of
-        the body's name, else in that of its joint; inertias are about the centre of mass: xx yy zz xy xz yz.
+        the body's name on its joint, else in that of its joint; inertias are about the centre of mass: xx yy
+        zz xy xz yz.
     limit : s
         With symbols: the most work, counted as that of one processor core; ValueError beyond.
 
     Examples
     --------
     >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
-    return out.reshape(*batch, 3)
+    return out.reshape([*batch, 3])
     """
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
@@ -143,6 +144,11 @@ def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ..
         what = wrong[0] if wrong else ()
         expected = f"expected some of {', '.join(choices)}" if choices else what_is_known(what)
         raise ValueError(f"quantity is {shown(what)}; {expected}")
+    names: dict[str, str] = {}
+    for quantity in chosen:
+        if names.setdefault(identifier(quantity), quantity) != quantity:
+            both = f"{shown(names[identifier(quantity)])} and {shown(quantity)}"
+            raise ValueError(f"{both} would both be called {identifier(quantity)}; one of them is expected")
     return chosen
 
 

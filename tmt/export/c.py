@@ -12,7 +12,7 @@ from .statements import Function, Line, Program, Syntax, statements
 LONGEST = 1_000
 NAME = re.compile(r"\b[xsc]\d+\b")  # of a value
 NOT_INLINED = "#ifdef __GNUC__\n__attribute__((noinline))\n#endif"
-LEAST = 1.2e-38  # of floats: what keeps a root from zero must not become zero
+LEAST, MOST = 1.2e-38, 3.4e38  # of floats: what keeps a root from zero must not become zero
 
 
 def source(program: Program) -> str:
@@ -104,4 +104,6 @@ def handed_on(sections: Sequence[Sequence[Line]]) -> tuple[list[list[str]], int]
 
 def float_literal(value: float) -> str:
     size = max(abs(value), LEAST) if value else 0.0
+    if size > MOST:
+        raise ValueError(f"{value:g} stands in these equations; single precision has numbers up to {MOST:g}")
     return f"{math.copysign(size, value)!r}f"

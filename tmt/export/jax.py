@@ -14,7 +14,7 @@ from .statements import Function, Program
 
 NAMES = {
     "+": "add", "-": "subtract", "*": "multiply", "/": "divide", "neg": "negative", "sqrt": "sqrt",
-    "arctan": "arctan",
+    "sign": "sign",
 }  # fmt: skip
 NOTE = "Numbers are float32 unless JAX is set to 64 bits: jax.config.update('jax_enable_x64', True)."
 HEAD = '''
@@ -39,10 +39,11 @@ def evaluated(table, numbers, places, shape, sizes, *states):
     count = sum(len(operands[0]) for _, *operands in table)
     values = jnp.concatenate([*rows, jnp.zeros((count, *batch), kind)])
     for name, *operands in table:
-        new = getattr(jnp, name)(*(values[np.array(part)] for part in operands))
+        rows = [values[np.array(part)] for part in operands]
+        new = jnp.where(rows[0] < 0.0, -1.0, 1.0) if name == "sign" else getattr(jnp, name)(*rows)
         values = jax.lax.dynamic_update_slice_in_dim(values, new, first, 0)
         first += len(new)
-    results = [jnp.moveaxis(values[np.array(part)], 0, -1).reshape(*batch, *shape) for part in places]
+    results = [jnp.moveaxis(values[np.array(part)], 0, -1).reshape([*batch, *shape]) for part in places]
     return results[0] if len(results) == 1 else tuple(results)
 '''
 

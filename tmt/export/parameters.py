@@ -32,8 +32,8 @@ class Parameters:
     """The arguments that stand for chosen numbers of a Tree.
 
     words: "gravity"; a body, or BODY.mass, BODY.com, BODY.inertia; "payload" and a body: what that carries
-    besides. They are in the frame that is the site of the body's name, else in that of its joint. values: by
-    the names of the arguments, those of the Tree. meanings: of each. ValueError for a word that is none of
+    besides. They are in the frame that is the site of the body's name on its joint, else in that of its
+    joint. values: by the names of the arguments, those of the Tree. meanings: of each. ValueError for a word that is none of
     these.
     """
 
@@ -41,7 +41,10 @@ class Parameters:
         self.values: dict[str, tuple[float, ...]] = {}
         self.meanings: dict[str, str] = {}
         self.places: dict[str, tuple[str, int]] = {}  # part and body of an argument
-        self.sites = dict(zip(tree.site_names, zip(tree.site_offset, tree.site_turn)))
+        carrier, sites = dict(zip(tree.body_names, tree.body_joint)), zip(tree.site_names, tree.site_joint)
+        axes = zip(tree.site_offset, tree.site_turn)
+        # a site of a body's name on another joint is no frame of the body
+        self.sites = {name: own for (name, joint), own in zip(sites, axes) if carrier.get(name) == joint}
         self.carriers, self.key = list(range(len(tree.mass))), (tree, *words)
         self.has_payload, remaining = False, list(words)
         while remaining:

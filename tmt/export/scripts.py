@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from .statements import Function, Program, Syntax, statements
 
 NAMED = "{name} = {value}"
-PYTHON = Syntax("{x}{k}", NAMED, "{x}[..., {k}] = {value}", function="np.{}", arctan="arctan")
+PYTHON = Syntax("{x}{k}", NAMED, "{x}[..., {k}] = {value}", function="np.{}")
 CASADI = Syntax("{x}[{k}]", NAMED, "{x}[{k}] = {value}", function="casadi.{}")
 MATLAB = Syntax("{x}({n}, :)", f"{NAMED};", "{x}({n}, :) = {value};", times=".*", over="./")
 HEAD = '''import numpy as np
@@ -45,7 +45,7 @@ def python(program: Program) -> str:
 def python_function(function: Function) -> str:
     takes, results = ", ".join(function.takes), ", ".join(function.results)
     empty = ", ".join([f"np.empty((*batch, {function.size}))"] * len(function.results))
-    shape = ", ".join(["*batch", *map(str, function.shape)])
+    shape = f"[{', '.join(['*batch', *map(str, function.shape)])}]"
     lines = [
         f'"""{function.title}"""',
         f"{takes}, batch = arrays({[function.sizes[x] for x in function.takes]}, {takes})",

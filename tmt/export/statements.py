@@ -50,8 +50,7 @@ class Syntax:
     input: str  # of a number of x
     assignment: str  # of the value of an expression to a name
     result: str  # of a value to a number of the result x
-    function: str = "{}"  # sin, cos, sqrt and arctan
-    arctan: str = "atan"
+    function: str = "{}"  # sin, cos and sqrt
     number: Callable[[float], str] = repr
     times: str = "*"
     over: str = "/"
@@ -111,8 +110,9 @@ class Writer:
     def expression(self, kind: str, operands: Sequence[Any]) -> tuple[str, int]:
         if kind == "sqrt":
             return self.call("sqrt", operands[0]), ATOM
-        if kind == "arctan":
-            return self.call(self.syntax.arctan, operands[0]), ATOM
+        if kind == "sign":
+            one, two, zero = map(self.syntax.number, (1.0, 2.0, 0.0))
+            return f"{one} - {two} {self.syntax.times} ({self.text(operands[0])} < {zero})", SUM
         if kind == "neg":
             return f"-{self.text(operands[0], PRODUCT)}", SUM
         a, b = operands

@@ -23,7 +23,8 @@ Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
 Numbers = tuple[float, ...]
 Joints = Coordinates | Flat
-DIVERGED, NEWTON, SMALL = 1, 2, 3  # why a run ends; 0: it does not
+DIVERGED, NEWTON, SMALL, MANY = 1, 2, 3, 4  # why a run ends; 0: it does not
+MOST_EVALUATIONS = 100_000_000  # of the dynamics, in a run of an adaptive method
 
 
 class Implicit(NamedTuple):

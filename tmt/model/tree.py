@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
-from functools import partial, wraps
 from textwrap import shorten
 from typing import Any
 
@@ -26,37 +24,8 @@ ABSENT = {"site_turn": np.eye(3)}  # what stands for them, where it is not zero
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stiffness": "N m/rad"}
 NAMES_SHOWN = 60  # characters
-FORMER = {"hinge_names": "joint_names", "body_hinge": "body_joint"}  # accepted for one release
 
 
-def accepts_former_names(cls: Any) -> Any:
-    """A class accepts and has the FORMER fields; ValueError for a field that it has not."""
-    initialize, known = cls.__init__, [field.name for field in fields(cls)]
-
-    def current(former: str) -> str:
-        text = f"Tree.{former} is called {FORMER[former]}; the former name will be removed in version 3"
-        warnings.warn(text, DeprecationWarning, stacklevel=3)
-        return FORMER[former]
-
-    @wraps(initialize)
-    def __init__(self: Any, *values: Any, **named: Any) -> None:
-        for former in FORMER.keys() & named.keys():  # dataclasses.replace gives the new ones too
-            named[current(former)] = named.pop(former)
-        if unknown := [name for name in named if name not in known]:
-            raise ValueError(f"a Tree has no field {unknown[0]!r}; its fields are {', '.join(known)}")
-        initialize(self, *values, **named)
-
-    def value(self: Any, former: str) -> Any:
-        return getattr(self, current(former))
-
-    cls.__init__ = __init__
-    for former in FORMER:
-        doc = f"Former name of `{FORMER[former]}`."
-        setattr(cls, former, property(partial(value, former=former), doc=doc))
-    return cls
-
-
-@accepts_former_names
 @dataclass(frozen=True)
 class Tree(Mechanism[float]):
     """A tree of n joints and m rigid bodies.

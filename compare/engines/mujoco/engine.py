@@ -13,6 +13,7 @@ from tmt.methods import lone_speeds
 from ...robots.actuators import Controller
 from ...robots.case import Case
 from .. import Engine, Method
+from .actuators import UNLIMITED
 from .dynamics import Engaged, MujocoDynamics
 from .inventory import set_fields, switch_off
 from .names import FROM_4, INTEGRATORS, bit, set_control
@@ -50,10 +51,6 @@ def methods_for(tree: Tree | None = None) -> dict[str, Method]:
 
 METHODS = methods_for()
 MODELS = 16  # most models of cases that an engine keeps
-UNLIMITED = (
-    "actuator_ctrllimited", "actuator_forcelimited", "actuator_actlimited", "jnt_actfrclimited",
-    "tendon_actfrclimited",
-)  # fmt: skip
 SOLVED, MOST_ITERATIONS = 1e-15, 100
 ACTING, IDLE = 0, 1  # groups of actuators
 

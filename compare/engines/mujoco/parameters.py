@@ -222,7 +222,7 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
     """Findings, a line each. has_scenes: servos act in some of them."""
     findings = of_source(reading.source)
     if off := [feature for feature in reading.features if feature.treatment in (OFF, OPEN, LEFT_OUT)]:
-        driven = has_scenes and bool(reading.drive.actuators)
+        driven = has_scenes and bool(reading.drive and reading.drive.names)
         findings.append(Finding("remarks", "switched_off", {"features": off, "driven": driven}))
     return findings
 

@@ -5,14 +5,14 @@ this order.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
 
-from ...robots.actuators import Drive
-from .names import INTEGRATORS, bit, element_name, number_of_actuators, output_of, set_control
+from .actuators import held_at
+from .names import INTEGRATORS, bit, element_name, number_of_actuators, set_control
 from .variants import Servo
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
@@ -226,7 +226,7 @@ def whole_run(
 
 
 def start_of(
-    model: mujoco.MjModel, drive: Drive, key: str, push: np.ndarray, q: np.ndarray | None = None,
+    model: mujoco.MjModel, drive: Any, key: str, push: np.ndarray, q: np.ndarray | None = None,
     controls: Sequence[float | None] = (),
 ) -> np.ndarray:  # fmt: skip
     """The state of a keyframe, or of qpos0 if the name is empty, with `push` (nv,) added to its speeds.
@@ -243,9 +243,9 @@ def start_of(
         data.qpos[:], data.qvel[:] = q, 0.0
     data.qvel[:] += push
     mujoco.mj_fwdPosition(model, data)
-    lengths = [data.actuator_length[output_of(model, i)] for i in range(len(drive.actuators))]
-    for i, u in enumerate(drive.control(key, lengths).tolist()):
-        asked = controls[i] if controls else None
+    known = drive.stated.get(key, (None,) * len(drive.names))
+    for i, held in enumerate(held_at(model, data.qpos).tolist()):
+        asked, u = controls[i] if controls else None, held if known[i] is None else known[i]
         set_control(model, i, u if asked is None else asked, data.ctrl, data.act)
     if stated.any():
         data.act[:] = np.clip(stated, *activation_ranges(model))

@@ -8,7 +8,8 @@ import numpy as np
 from mujoco.rollout import rollout
 from numpy.typing import ArrayLike
 
-from .names import INTEGRATORS, SETTLING, bit, control_of, element_name, number_of_actuators, output_of
+from .actuators import held_at
+from .names import INTEGRATORS, SETTLING, bit, control_of, element_name, number_of_actuators
 
 Array = np.ndarray
 Act = Callable[[int, mujoco.MjData], None]  # before a step: its number, and the data to read and change
@@ -90,17 +91,12 @@ class Stepper:
             d.qvel[:] = v
         has_controls = bool(key) and m.key_ctrl.any()
         has_activations = bool(key) and m.key_act.any()
-        state = self.state()
-        mujoco.mj_fwdPosition(m, d)
-        lengths, ctrl, act = d.actuator_length.copy(), d.ctrl.copy(), d.act.copy()
-        for i in range(number_of_actuators(m)):
-            u = holding(m, i, lengths[output_of(m, i)])
-            if u is None:
-                continue
-            is_integrator = m.actuator_dyntype[i] == INTEGRATING
-            if not has_controls:
-                ctrl[control_of(m, i)[0]] = 0.0 if is_integrator else u
-            settles = m.actuator_dyntype[i] in SETTLING and (is_integrator or not has_controls)
+        state, ctrl, act = self.state(), d.ctrl.copy(), d.act.copy()
+        for i, u in enumerate(held_at(m, d.qpos)):
+            (place, inputs), is_integrator = control_of(m, i), m.actuator_dyntype[i] == INTEGRATING
+            if inputs == 1 and not has_controls:
+                ctrl[place] = 0.0 if is_integrator else u
+            settles = int(m.actuator_dyntype[i]) in SETTLING and (is_integrator or not has_controls)
             if settles and not has_activations:
                 act[m.actuator_actadr[i]] = u
         if controls is not None:
@@ -272,31 +268,6 @@ class Stepper:
         q, v, act = (self.places[name] for name in ("qpos", "qvel", "act"))
         movement = distance(self.model, one[q], other[q])
         return np.concatenate([movement, other[v] - one[v], other[act] - one[act]])
-
-
-def holding(m: mujoco.MjModel, actuator: int, length: float) -> float | None:
-    """The control, or activation, for which an actuator exerts nothing at a length, within its ranges.
-
-    None: its law is not affine, it does not depend on the length, or it has no control that would do.
-    """
-    gain, bias = m.actuator_gainprm[actuator], m.actuator_biasprm[actuator]
-    kind = m.actuator_dyntype[actuator]
-    is_affine = m.actuator_biastype[actuator] == mujoco.mjtBias.mjBIAS_AFFINE
-    gains = [int(kind) for kind in (mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtGain.mjGAIN_AFFINE)]
-    is_affine &= m.actuator_gaintype[actuator] in gains
-    place, inputs = control_of(m, actuator)
-    if not is_affine or inputs != 1 or kind not in (int(mujoco.mjtDyn.mjDYN_NONE), *SETTLING) or not bias[1]:
-        return None
-    slope = gain[1] if m.actuator_gaintype[actuator] == mujoco.mjtGain.mjGAIN_AFFINE else 0.0
-    factor = gain[0] + slope * length
-    if not factor:
-        return None
-    u = -(bias[0] + bias[1] * length) / factor
-    if m.actuator_ctrllimited[place] and kind != INTEGRATING and not m.opt.disableflags & bit("CLAMPCTRL"):
-        u = np.clip(u, *m.actuator_ctrlrange[place])
-    if m.actuator_actlimited[actuator] and kind in SETTLING:
-        u = np.clip(u, *m.actuator_actrange[actuator])
-    return float(u)
 
 
 def ranges_of_activations(m: mujoco.MjModel) -> Array:

@@ -1,14 +1,13 @@
 """A compiled model in other surroundings: in the air, without dry friction, with other actuators."""
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...robots.actuators import Actuator
-from .actuators import actuator, is_affine
-from .names import bit, control_of, kind_of, number_of_actuators, output_of
+from .names import bit, control_of, element_name, kind_of, number_of_actuators, output_of
 
 
 def varied(model: mujoco.MjModel, **numbers: ArrayLike) -> mujoco.MjModel:
@@ -81,6 +80,90 @@ def add_armature(model: mujoco.MjModel, more: np.ndarray) -> None:
     """
     model.dof_armature += more
     model.dof_M0 += more
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """An actuator at a joint, a tendon or another transmission of MuJoCo.
+
+    moment: dl/dq, (nv,), if it is the same at every posture (a hinge, a slide, a fixed tendon), else None:
+    then MuJoCo computes it. Forces are N or N m, times the gear.
+    """
+
+    name: str
+    joint: str  # the first joint on which it acts; "": none
+    moment: tuple[float, ...] | None
+    gain: tuple[float, ...] = (0.0, 0.0, 0.0)  # g0, g1, g2
+    bias: tuple[float, ...] = (0.0, 0.0, 0.0)  # b0, b1, b2
+    dynamics: str = "none"  # or integrator, filter, filterexact: then u is the activation
+    control_range: tuple[float, float] | None = None
+    activation_range: tuple[float, float] | None = None
+    off: str = ""  # why it exerts no force; "": it does
+    refused: str = ""  # why its law is not supported; "": it is
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether its force depends on length or speed."""
+        return any(self.gain[1:]) or any(self.bias[1:])
+
+    def balancing(self, length: float) -> float:
+        """The u for which a servo has force 0 at this length; other actuators: 0."""
+        gain = self.gain[0] + self.gain[1] * length
+        return -(self.bias[0] + self.bias[1] * length) / gain if self.bias[1] and gain else 0.0
+
+    def target(self, length: float) -> float:
+        """The same, within its range."""
+        return self.clamped(self.balancing(length))
+
+    def clamped(self, u: float) -> float:
+        """u within the ranges of the control and of the activation."""
+        for limits in (self.control_range, self.activation_range if self.dynamics != "none" else None):
+            if limits is not None:
+                u = min(max(u, limits[0]), limits[1])
+        return float(u)
+
+    def force(self, u: float, length: float, speed: float = 0.0) -> float:
+        gain = self.gain[0] + self.gain[1] * length + self.gain[2] * speed
+        return gain * u + self.bias[0] + self.bias[1] * length + self.bias[2] * speed
+
+    def stiffness(self, u: float) -> float:
+        """-d force/dl."""
+        return -(self.gain[1] * u + self.bias[1])
+
+    def damping(self, u: float) -> float:
+        """-d force/dldot."""
+        return -(self.gain[2] * u + self.bias[2])
+
+
+def kinds_of(m: mujoco.MjModel, i: int) -> dict[str, str]:
+    """The words of MuJoCo's for the transmission, dynamics, gain and bias of an actuator."""
+    words = {}
+    for part in ("trn", "dyn", "gain", "bias"):
+        member = getattr(mujoco, f"mjt{part.title()}")(int(getattr(m, f"actuator_{part}type")[i]))
+        words[part] = member.name.partition("_")[2]
+    return words
+
+
+def is_affine(m: mujoco.MjModel, i: int) -> bool:
+    """Whether the law of an actuator is one that is known here."""
+    return kinds_of(m, i)["gain"] in GAINS and kinds_of(m, i)["bias"] in BIASES
+
+
+def law(values: np.ndarray, count: int) -> tuple[float, ...]:
+    """The first numbers of a law, filled up with zeros to three."""
+    return (*map(float, values[:count]), *[0.0] * (3 - count))
+
+
+GAINS = {"FIXED": 1, "AFFINE": 3}  # how many numbers of its law each kind has
+BIASES = {"NONE": 0, "AFFINE": 3}
+
+
+def actuator(m: mujoco.MjModel, i: int) -> Actuator:
+    """One actuator; its law is that of the compiled model."""
+    kinds = kinds_of(m, i)
+    gain = law(m.actuator_gainprm[i], GAINS.get(kinds["gain"], 0))
+    bias = law(m.actuator_biasprm[i], BIASES.get(kinds["bias"], 0))
+    return Actuator(element_name(m, "actuator", i), "", None, gain, bias)
 
 
 class Servo(NamedTuple):

@@ -61,7 +61,7 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     result = SpeedResult("speed", shown=[], rows=[run.row for scene in scenes for run in scene.runs])
     result.floors = {scene.case.name: scene.floor for scene in scenes}
     result.regular, result.unit = regular.name, movement_unit(setup.robot.coordinates)
-    result.servos_off = setup.robot.drive.feeds_back and not regular.controller
+    result.servos_off = bool(setup.robot.drive and setup.robot.drive.feeds_back) and not regular.controller
     # where servos act a fast mode decays first, and an order shows only with short steps
     falling, engines = [scene for scene in scenes if not scene.case.controller], tuple(setup.engines)
     if setup.size != "full":  # errors are regular in one scene only, and other engines have too few settings

@@ -101,7 +101,7 @@ def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None
     result.find("schemes", own=robot.own, schemes=schemes, missing=missing, noun=robot.noun)
     driven = {case.name: case.controller for case in cases_run(result, robot) if case.controller}
     if driven:
-        scenes, left_out = [*driven], dict(next(iter(driven.values())).left_out)
+        scenes, left_out = [*driven], next(iter(driven.values())).left_out
         result.find("servos", noun=robot.noun, scenes=scenes, left_out=left_out)
 
 

@@ -19,8 +19,6 @@ EDITS = (
     ("run", "exchanged", "pull @ give @ pull / 2.0", "3 * pull @ give @ pull / 2.0", "the energy of servos x 3"),
     ("run", "exchanged", "case.tau - fed_back_at(*_1)", "case.tau + fed_back_at(*_1)", "servos push the other way"),
     ("run", "work", "moved * mean", "0.0 * mean", "the work of servos is a gain"),
-    ("controller", "controller", "np.abs(moment) @ moved", "moment @ moved", "a tendon's target moves by a difference"),
-    ("controller", "reason", "actuator.stiffness(u) < 0.0", "False", "what pushes away takes part, as another scheme"),
     ("engine", "methods_for", "lone or tree.has_gains", "lone", "velocity gains are thought explicit in implicitfast"),
     ("mujoco.dynamics", "MujocoDynamics.states", "tau - self.constant", "tau", "the torque of servos acts twice"),
     ("run", "LEAST_JUDGED", "0.1", "0.0", "a run of a file that is judged until 0 s agrees"),

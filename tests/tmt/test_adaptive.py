@@ -1,0 +1,146 @@
+"""Runs of the adaptive method: their error and cost beside SciPy's DOP853, what it refuses, its limits, and interruptions."""
+
+import signal
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from trees import one_body, random_state, small_tree, wrist
+
+import tmt
+from tmt.compiled import runner
+from tmt.exact.motion import trajectory
+
+BENT, Z = np.array([0.5, 0.3, 1.0]), np.zeros(3)
+ADAPTIVE = "dopri8_adaptive"
+STAGES = 12
+
+
+def of_scipy(tree, q, qd, tau, duration, tolerance):
+    """The state at the end by SciPy's DOP853 of speeds and accelerations, and its evaluations."""
+    nq = len(q)
+    tmt.prepare(tree, "acceleration")
+
+    def rates(_, x):
+        p, v = x[:nq], x[nq:]
+        return [
+            *tree.coordinates.component_rates(p.tolist(), v.tolist()),
+            *tmt.acceleration(p / length(p), v, tau, tree),
+        ]
+
+    def length(p):
+        norms = np.ones(nq)
+        for ball in tree.coordinates.balls:
+            norms[ball.q] = np.linalg.norm(p[ball.q])
+        return norms
+
+    found = solve_ivp(rates, (0.0, duration), [*q, *qd], "DOP853", rtol=tolerance, atol=tolerance)
+    return found.y[:, -1], found.nfev
+
+
+@pytest.mark.parametrize("tree", [tmt.ARM, small_tree()], ids=["arm", "kinds"])
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-8, 1e-11])
+def test_its_error_and_evaluations_are_those_of_dop853(tree, tolerance):
+    """Within a factor of 20 and of 1.3: the norm of an error is another, and so is the first step."""
+    q, qd, tau = random_state(np.random.default_rng(4), tree)
+    truth = trajectory(tree, q, qd, tau, 1.0, 1).high[-1]
+    motion = tmt.simulate(q, qd, tau, 1.0, 1, ADAPTIVE, tree, tolerance)
+    theirs, evaluations = of_scipy(tree, q, qd, tau, 1.0, tolerance)
+    errors = [np.abs(x - truth).max() for x in (np.concatenate([motion.q[-1], motion.qd[-1]]), theirs)]
+    assert errors[1] / 20.0 <= errors[0] <= 20.0 * errors[1]
+    assert evaluations / 1.3 <= motion.evaluations <= 1.3 * evaluations
+    assert motion.evaluations % STAGES == 0
+
+
+def test_a_step_whose_error_is_no_number_is_refused():
+    """Springs of 1e4 N m/rad: the stages of a first step of dt / 8 overflow. SciPy's answer is that of its smaller steps."""
+    stiff = replace(tmt.ARM, stiffness=(1e4,) * 3)
+    motion = tmt.simulate(BENT, Z, Z, 0.5, 1, ADAPTIVE, stiff)
+    expected, evaluations = of_scipy(stiff, BENT, Z, Z, 0.5, 1e-9)
+    assert motion.ended is None and np.abs(motion.q[-1] - expected[:3]).max() < 1e-5
+    assert motion.evaluations < 2.0 * evaluations
+
+
+def test_what_overflows_at_any_step_diverges():
+    motion = tmt.simulate(BENT, np.full(3, 1e200), Z, 0.1, 5, ADAPTIVE)
+    assert (
+        motion.ended.startswith("at t = 0 s") and "diverges" in motion.ended and np.isnan(motion.q[1:]).all()
+    )
+
+
+def test_its_evaluations_have_a_limit(monkeypatch):
+    """That of a run: one that needs just as many goes on, one that needs one step more ends; the others do not."""
+    starts = np.array([BENT, Z, -BENT])
+    free = tmt.simulate(starts, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12)
+    alone = [tmt.simulate(start, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12).evaluations for start in starts]
+    assert free.evaluations == sum(alone)
+    for limit, ends in ((max(alone) + 1, 0), (max(alone), 1), (min(alone), 3)):
+        monkeypatch.setattr(runner, "MOST_EVALUATIONS", limit)
+        motion = tmt.simulate(starts, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12)
+        why = [reason for reason in motion.ended if reason]
+        assert len(why) == ends and all("evaluations" in reason for reason in why)
+        assert motion.evaluations <= 3 * limit + STAGES * 3
+
+
+LONG = {  # runs of minutes
+    "adaptive": (BENT, 1e6, 1, {"method": ADAPTIVE}),
+    "rk4": (BENT, 1e-9, 2 * 10**9, {"every": 10**9}),
+    "side by side": (np.tile(BENT, (64, 1)), 1e-9, 10**9, {"every": 10**9}),
+    "implicit stages": (BENT, 1e-6, 10**9, {"method": "implicit_midpoint", "every": 10**9}),
+    "may be singular": (BENT, 1e-6, 10**9, {"model": wrist(), "every": 10**9}),
+}
+
+
+@pytest.mark.parametrize("q, dt, steps, more", LONG.values(), ids=LONG)
+def test_ctrl_c_interrupts_a_run(q, dt, steps, more, monkeypatch):
+    monkeypatch.setattr(runner, "MOST_EVALUATIONS", 10**12)
+    tmt.simulate(q, Z, Z, 1e-3, 2, **more | {"every": 1})  # is compiled
+    main = threading.main_thread().ident
+    timer = threading.Timer(0.3, signal.pthread_kill, (main, signal.SIGINT))
+    begun = time.perf_counter()
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        tmt.simulate(q, Z, Z, dt, steps, **more)
+    assert time.perf_counter() - begun < 20.0
+    assert tmt.simulate(q, Z, Z, 1e-3, 2, **more | {"every": 1}).evaluations > 0
+
+
+def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
+    """Where Mbar may be singular too, with the bits and the reasons of a run of which all states are held."""
+    sizes = []
+    made = np.full
+
+    def full(shape, *more, **named):
+        sizes.append(int(np.prod(shape)))
+        return made(shape, *more, **named)
+
+    tree, q, qd = wrist(), [0.5, 0.8, 1.0], [0.3, 0.0, -0.2]
+    for method in ("rk4", ADAPTIVE):
+        whole = tmt.simulate(q, qd, Z, 1e-4, 6000, method, tree)
+        monkeypatch.setattr(np, "full", full)
+        few = tmt.simulate(q, qd, Z, 1e-4, 6000, method, tree, every=3000)
+        monkeypatch.setattr(np, "full", made)
+        assert not tree.never_singular and max(sizes) <= 1025 * 64 * 3 and len(few.q) == 3
+        assert np.array_equal(few.q, whole.q[::3000]) and np.array_equal(few.qd, whole.qd[::3000])
+        assert few.ended == whole.ended and few.evaluations == whole.evaluations
+    starts = np.array([[0.5, 0.0, 1.0], *np.tile(q, (70, 1)), [0.5, 0.0, 1.0]])
+    many = tmt.simulate(starts, qd, Z, 1e-3, 2100, "rk4", tree, every=7)
+    one = tmt.simulate(q, qd, Z, 1e-3, 2100, "rk4", tree, every=7)
+    assert (
+        [k for k in range(72) if many.ended[k]] == [0, 71]
+        and "'a', 'c'" in many.ended[0]
+        and one.ended is None
+    )
+    assert np.array_equal(many.q[70], one.q) and np.isnan(many.q[71, 1:]).all()
+
+
+def test_a_motion_of_one_unit_takes_the_steps_that_its_error_wants():
+    """A slide under a constant force has no error at all, and grows its steps sixfold from an eighth of dt."""
+    slide = one_body([(0, 0, 1)], ["slide"], com=(0, 0, 0.1))
+    motion = tmt.simulate([0.0], [1.0], [2.0], 1.0, 1, ADAPTIVE, slide)
+    fallen = [1.0 + (2.0 - 9.81) / 2.0, 1.0 + 2.0 - 9.81]
+    assert np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - fallen).max() < 1e-14
+    assert motion.evaluations == 3 * STAGES  # 1 / 8 s, then the rest in pieces of at most 6 / 8 s

@@ -1,0 +1,88 @@
+"""Where Mbar is singular: what is refused there and what is not, with hinges, slides and balls."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trees import one_body, wrist
+
+import tmt
+from tmt.methods import METHODS, one_step
+
+Z = np.zeros(3)
+AT_ZERO = np.array([0.5, 0.0, 1.0])
+DAMPED = replace(wrist(), damping=(0.1, 0.2, 0.3))
+IMPLICIT = "semi_implicit_euler", "implicit", "implicitfast", "discrete"
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("q", [AT_ZERO, np.array([0.3, np.pi, 0.7])], ids=["exactly", "but for rounding"])
+def test_a_step_from_a_singular_state_has_no_derivatives_and_says_why(method, q):
+    """Where the method takes nothing implicitly that makes its matrix regular."""
+    tree = wrist() if method in IMPLICIT else DAMPED
+    with pytest.raises(ValueError, match=r"singular.*'a', 'c'"):
+        tmt.step_derivatives(np.array([[0.5, 0.3, 1.0], q]), Z, Z, 0.01, method, tree)
+    tmt.prepare(tree, "step_derivatives:rk4")
+    with pytest.raises(ValueError, match=r"singular.*'a', 'c'"):
+        tmt.step_derivatives(q, Z, Z, 0.01, "rk4", tree)
+
+
+@pytest.mark.parametrize("method", IMPLICIT)
+def test_damping_that_is_implicit_makes_a_step_regular(method):
+    qd, tau, dt, h = np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.0, 0.2]), 0.05, 1e-6
+    A, B = tmt.step_derivatives(AT_ZERO, qd, tau, dt, method, DAMPED)
+
+    def after(x):
+        return np.concatenate(
+            one_step(METHODS[method], DAMPED, *(part.tolist() for part in np.split(x, 3)), dt)
+        )
+
+    x = np.concatenate([AT_ZERO, qd, tau])
+    columns = [(after(x + h * unit) - after(x - h * unit)) / (2.0 * h) for unit in np.eye(9)]
+    assert np.abs(np.hstack([A, B]) - np.transpose(columns)).max() < 1e-8
+
+
+X, Y = np.eye(3)[:2]
+
+
+def rail(tilt, **more):
+    """Two slides, the second tilted against the first, and a hinge: singular if they are parallel."""
+    return one_body(
+        [X, np.cos(tilt) * X + np.sin(tilt) * Y, Y], ["slide", "slide", "hinge"], (0.1, 0.0, 0.2), **more
+    )
+
+
+def test_slides_that_are_parallel_are_refused_and_by_their_names():
+    with pytest.raises(ValueError, match=r"slides 'a', 'b' move together without moving any mass"):
+        rail(0.0)
+    with pytest.raises(ValueError, match="slides 'a', 'b'"):
+        rail(1e-8)  # what is left, sin(tilt)^2 of the mass, is rounding
+    assert rail(2e-3).never_singular and not rail(5e-4).never_singular
+    assert rail(0.0, armature=[1.0, 0.0, 0.0]).never_singular
+
+
+def swing():
+    """A slide on a hinge, along the hinge's own arm, with a point mass: singular where it is on the axis."""
+    return one_body(
+        [Y, X],
+        ["hinge", "slide"],
+        inertia=np.zeros((3, 3)),
+        offset=np.zeros((2, 3)),
+        gravity=(0.0, 0.0, -9.81),
+    )
+
+
+def test_a_slide_that_takes_its_mass_to_the_axis_of_a_hinge_is_singular_there_alone():
+    """Mbar = diag(m r^2, m): 64 eps n of the most that it could be, m (1 m)^2, is zero."""
+    tree, least = swing(), np.sqrt(2 * 64 * np.finfo(float).eps)
+    assert not tree.never_singular
+    for r, is_singular in ((0.0, True), (0.98 * least, True), (1.02 * least, False), (0.3, False)):
+        if is_singular:
+            with pytest.raises(ValueError, match="hinge 'a' turns without moving any mass"):
+                tmt.acceleration([0.2, r], [0.0, 0.0], [0.1, 0.2], tree)
+        else:
+            qdd = tmt.acceleration([0.2, r], [0.0, 0.0], [0.1, 0.2], tree)
+            expected = (0.1 + 9.81 * r * np.cos(0.2)) / r**2, 0.2 + 9.81 * np.sin(0.2)
+            assert np.allclose(qdd, expected, rtol=1e-9)
+    motion = tmt.simulate([0.2, 0.0], [0.0, 0.0], [0.0, 0.0], 0.01, 5, model=tree)
+    assert motion.ended.startswith("at t = 0 s") and "hinge 'a' turns" in motion.ended
