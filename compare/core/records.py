@@ -17,6 +17,7 @@ class Experiment:
     order: int = 0  # of `all` and of the report
     serves_own: bool = True  # a user's own equations; if not, the macro not_of_own says why
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
+    asks_others: bool = False  # engines beside mujoco and tmt, of which --engines has to name one
     needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
     options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
     # the most speeds of a robot for which a quick run of several experiments has it; None: any

@@ -24,7 +24,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.records import records_in
-from ..robots.actuators import Controller
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
 
@@ -127,14 +126,6 @@ class Motion(NamedTuple):
         return np.concatenate([self.q, self.v], axis=-1)
 
 
-class Servos(NamedTuple):
-    """The robot's own actuators: controls for an engine that has them, or their law for all others."""
-
-    controller: Controller
-    position_gain: Array  # (nv, nq) N m/rad
-    speed_gain: Array  # (nv, nv) N m s/rad
-
-
 class Course(NamedTuple):
     """A run that an engine is asked for."""
 
@@ -145,13 +136,6 @@ class Course(NamedTuple):
     steps: int  # of equal length, a multiple of len(times) - 1; 0: within the tolerance
     method: str
     tolerance: Tolerance = None
-    servos: Servos | None = None  # tau is their torque at q = 0 and at rest
-
-    def force(self, q: Array, v: Array) -> Array:
-        """tau, (nv,), with that of servos at a state."""
-        if self.servos is None:
-            return self.tau
-        return np.asarray(self.tau - self.servos.position_gain @ q - self.servos.speed_gain @ v)
 
     @property
     def dt(self) -> float:

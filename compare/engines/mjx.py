@@ -1,24 +1,20 @@
 """MJX: the model that MuJoCo compiles, computed by JAX."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from tmt import Tree
 
 from . import Array, Course, EngineRecord
+from .outside import as_it_runs
 from .outside.file import File
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import OfCompiled
 from .outside.order import State
-
-if TYPE_CHECKING:
-    from .mujoco.handed_on import Bare
 
 ENGINE = EngineRecord(
     order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", reads_file=True, compiles=True,
@@ -37,77 +33,38 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 class Model(OfCompiled):
     def __init__(self, file: File, precision: str):
         import jax
+        from mujoco import mjx
 
-        jax.config.update("jax_default_device", jax.devices("cpu")[0])  # of all but batches
+        jax.config.update("jax_default_device", jax.devices("cpu")[0])
         super().__init__(file, precision)
-        self.data = self.made_data(self.bare)
+        self.data = mjx.make_data(self.bare, impl="jax")
 
     def put_model(self, model: Any) -> Any:
         from mujoco import mjx
 
         return mjx.put_model(model, impl="jax")
 
-    def made_data(self, bare: Bare) -> Any:
-        from mujoco import mjx
+    def held(self, model: Any, name: str) -> Array:
+        return np.array(attrgetter(name)(model))
 
-        data = mjx.make_data(bare.model, impl="jax")
-        controls = {"ctrl": bare.engaged.ctrl, "act": bare.engaged.act}
-        return data.replace(**{name: values + 0.0 * getattr(data, name) for name, values in controls.items()})
-
-    @cached_property
-    def model(self) -> Any:
-        """The model without damping and stiffness, which are part of the force."""
-        model = next(iter(self.models.values()))
-        return model.replace(**{name: 0.0 * getattr(model, name) for name in STIFFNESS_AND_DAMPING})
-
-    def held(self, name: str) -> Array:
-        return np.array(attrgetter(name)(next(iter(self.models.values()))))
-
-    def values(self, at: State, force: Array | None = None) -> tuple[Array, ...]:
-        """M, h and the acceleration."""
-        force = np.zeros_like(at.u) if force is None else force
+    def values(self, at: State, force: Array) -> tuple[Array, ...]:
+        """M, h and the acceleration, without damping and stiffness, which are part of the force."""
+        model = self.first.replace(**{name: 0.0 * getattr(self.first, name) for name in STIFFNESS_AND_DAMPING})
         state = (values.astype(self.precision) for values in (at.x, at.u, force))
-        return tuple(map(np.asarray, functions()["values"](self.model, self.data, *state)))
+        return tuple(map(np.asarray, functions()["values"](model, self.data, *state)))
 
     def mass_matrix(self, at: State) -> Array:
-        return self.values(at)[0]
+        return self.values(at, 0.0 * at.u)[0]
 
     def bias(self, at: State) -> Array:
-        return self.values(at)[1]
+        return self.values(at, 0.0 * at.u)[1]
 
     def acceleration(self, at: State, force: Array) -> Array:
         return self.values(at, force)[2]
 
-    def with_step(self, model: Any, dt: float) -> Any:
-        return model.tree_replace({"opt.timestep": np.asarray(dt, self.precision)})
-
-    def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
-        """On the first device that JAX has, which may be a GPU."""
-        import jax
-
-        device, model = jax.devices()[0], self.with_step(self.models[course.method], course.dt)
-        start = self.placed(course.q, course.v, course.tau)
-        arguments = jax.device_put((model, self.data, *start), device)
-
-        def ends() -> Array:
-            qpos, _ = functions()["worlds"](*arguments, course.steps)
-            return np.asarray(qpos.block_until_ready()[0, 0])[self.bare.qpos]
-
-        return ends, str(device.device_kind)
-
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Quaternions do not move like numbers."""
-        return super().quantities + ("derivatives",) * (not self.file.coordinates.has_balls)
-
-    def derivatives(self, at: State, force: Array) -> Array:
-        state = (values.astype(self.precision) for values in (at.x, at.u, force))
-        return np.array(functions()["derivatives"](self.model, self.data, *state))
-
-    def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
-        data = self.data if bare is self.bare else self.made_data(bare)
-        model = self.with_step(model, course.dt)
-        path = functions()["path"](model, data, *start, course.every, records=len(course.times) - 1)
+    def path(self, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
+        model = model.tree_replace({"opt.timestep": np.asarray(course.dt, self.precision)})
+        path = functions()["path"](model, self.data, *start, course.every, records=len(course.times) - 1)
         qpos, qvel = map(np.asarray, path)
         return qpos, qvel
 
@@ -132,15 +89,24 @@ def functions() -> dict[str, Callable[..., Any]]:
 
         return jax.lax.scan(record, (qpos, qvel), None, records)[1]
 
-    worlds = jax.vmap(partial(path, records=1), in_axes=(None, None, 0, 0, 0, None))
-
-    def acceleration(model: Any, data: Any, *state: Any) -> Any:
-        return values(model, data, *state)[2]
-
     compiled = partial(jax.jit, compiler_options=COMPILER)
-    return {
-        "values": compiled(values),
-        "derivatives": compiled(jax.jacfwd(acceleration, argnums=(2, 3, 4))),
-        "path": compiled(path, static_argnames="records"),
-        "worlds": compiled(worlds),
-    }
+    return {"values": compiled(values), "path": compiled(path, static_argnames="records")}
+
+
+class Stepper(as_it_runs.Stepper):
+    def __init__(self, file: File, model: Any):
+        import jax
+        from mujoco import mjx
+
+        jax.config.update("jax_default_device", jax.devices("cpu")[0])
+        self.model, self.mjx, self.put_model = model, mjx, mjx.put_model(model, impl="jax")
+        self.advance = jax.jit(mjx.step, compiler_options=COMPILER)
+
+    def put(self, data: Any) -> Any:
+        return self.mjx.put_data(self.model, data, impl="jax")
+
+    def step(self, data: Any) -> Any:
+        return self.advance(self.put_model, data)
+
+    def get(self, data: Any) -> Any:
+        return self.mjx.get_data(self.model, data)

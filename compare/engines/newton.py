@@ -44,20 +44,12 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
 
 
 class Model(SteppedModel):
-    has_links = True
-    share = 1e-6
-
     def __init__(self, file: File, precision: str):
         import newton
         import warp
 
-        builder, warp.config.enable_backward = newton.ModelBuilder(), False
-        newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
-        if file.path.suffix == ".urdf":
-            builder.add_urdf(str(file.path), floating=file.floating)
-        else:
-            builder.add_mjcf(str(file.path), skip_equality_constraints=True)
-        self.newton, self.file, self.model = newton, file, builder.finalize(device="cpu")
+        warp.config.enable_backward = False
+        self.newton, self.file, self.model = newton, file, read(file, skip_equality_constraints=True)
         self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
         self.solver = cache(self.made_solver)
         for name in OFF:
@@ -105,24 +97,22 @@ class Model(SteppedModel):
             prm.zero_()  # with actuation disabled implicitfast would be explicit in the damping
         return solver
 
-    def apply(self, name: str) -> None:
+    def set(self, name: str, values: Array) -> None:
+        """The armature of a free body would act on the velocity of its centre of mass: it is left as it is."""
         if name == "gravity":
-            self.model.gravity.assign(np.reshape(self.used[name], (1, 3)))
+            self.used[name] = values
+            self.model.gravity.assign(np.reshape(values, (1, 3)))
         else:
+            is_left = self.order.is_of_free() & (name == "armature")
+            self.used[name] = np.where(is_left, self.used[name], values)
             getattr(self.model, f"joint_{name}").assign(self.used[name][self.order.v])
-
-    def unable(self, name: str) -> Array:
-        """The armature of a free body acts on the velocity of its centre of mass."""
-        return self.order.is_of_free() & (name == "armature")
 
     def links(self, at: State) -> list[Link]:
         self.set_state(at)
         arrays = self.state.body_q, self.model.body_mass, self.model.body_com, self.model.body_inertia
         numbers, links = [array.numpy().astype(float) for array in arrays], []
-        kinds, parents = self.model.joint_type.numpy(), self.model.joint_parent.numpy()
-        for kind, parent, child, first, end in zip(
-            kinds, parents, self.children, self.firsts, self.firsts[1:]
-        ):
+        of_joints = self.model.joint_type.numpy(), self.model.joint_parent.numpy(), self.children, self.firsts, self.firsts[1:]
+        for kind, parent, child, first, end in zip(*of_joints):
             x, *body = (array[child] for array in numbers)
             # of several joints the last moves the body
             last = max((dof for dof in range(first, end) if dof in self.joint_at), default=None)
@@ -131,18 +121,16 @@ class Model(SteppedModel):
             links.append(Link(int(child), int(parent), joint, turn, x[:3], Body(*body)))
         return links
 
-    def set_body(self, link: Link, body: Body) -> bool:
+    def set_body(self, link: Link, body: Body) -> None:
         numbers = {"mass": body.mass, "com": body.com, "inertia": body.inertia}
-        is_massive = body.mass > 0.0
-        numbers["inv_mass"] = 1.0 / body.mass if is_massive else 0.0
-        numbers["inv_inertia"] = np.linalg.inv(body.inertia) if is_massive else np.zeros((3, 3))
+        numbers["inv_mass"] = 1.0 / body.mass if body.mass else 0.0
+        numbers["inv_inertia"] = np.linalg.inv(body.inertia) if body.mass else np.zeros((3, 3))
         for name, value in numbers.items():
             array = getattr(self.model, f"body_{name}")
             values = array.numpy()
             values[link.name] = value
             array.assign(values)
         self.order = self.made_order()  # centres of mass of free bodies
-        return True
 
     def set_state(self, at: State) -> None:
         self.state.joint_q.assign(at.x)
@@ -163,8 +151,7 @@ class Model(SteppedModel):
         self.newton.eval_inverse_dynamics_passive(self.model, self.state, **forces)
         return np.asarray(weight.numpy().astype(float) + rest.numpy() + M @ at.c)
 
-    def set_passive(self, method: str | None) -> None:
-        """Give a method the damping and stiffness that act in it; None: none."""
+    def start(self, at: State, dt: float, method: str | None) -> None:
         for name in PASSIVE:
             values = self.used[name][self.order.v] * (method is not None)
             getattr(self.model, f"joint_{name}").assign(values)
@@ -173,10 +160,6 @@ class Model(SteppedModel):
         if method == FEATHERSTONE and (is_damped or self.used["stiffness"][is_of_ball].any()):
             missing = "no springs of ball joints and no damping of free joints"
             raise EngineError(f"the Featherstone solver has {missing}")
-        self.solver(method or FEATHERSTONE)
-
-    def start(self, at: State, dt: float, method: str | None) -> None:
-        self.set_passive(method)
         self.set_state(at)
         self.method, self.dt = method or FEATHERSTONE, dt
 
@@ -190,3 +173,16 @@ class Model(SteppedModel):
         self.state, self.next = self.next, self.state
         x, u = (values.numpy().astype(float) for values in (self.state.joint_q, self.state.joint_qd))
         return x, u
+
+
+def read(file: File, **options: Any) -> Any:
+    """Newton's model of a file."""
+    import newton
+
+    builder = newton.ModelBuilder()
+    newton.solvers.SolverMuJoCo.register_custom_attributes(builder)
+    if file.is_urdf:
+        builder.add_urdf(str(file.path), floating=file.floating)
+    else:
+        builder.add_mjcf(str(file.path), **options)
+    return builder.finalize(device="cpu")

@@ -1,12 +1,10 @@
 """MuJoCo Warp: the model that MuJoCo compiles, computed by Warp's kernels, in float32, here on a CPU."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,16 +12,15 @@ from tmt import Tree
 from tmt.methods import lone_speeds
 
 from . import Array, Course, EngineRecord
+from .outside import as_it_runs
 from .outside.file import File
 from .outside.of_compiled import METHODS as OF_MJX
 from .outside.of_compiled import OfCompiled
 from .outside.order import State
 
-if TYPE_CHECKING:
-    from .mujoco.handed_on import Bare
-
 ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp",
                       reads_file=True, compiles=True, precision="float32")  # fmt: skip
+MOST_CONTACTS, MOST_ROWS = 200, 1000  # of a world in a run of the file as it is
 METHODS = OF_MJX | {"implicit": (1, "implicit"), "discrete": (1, "semi_implicit_euler")}
 
 
@@ -46,106 +43,96 @@ class Model(OfCompiled):
 
         self.warp, self.engine = warp, mujoco_warp
         super().__init__(file, precision)
-        # data, by MuJoCo's model, the number of states, the device
-        self.worlds: dict[tuple[int, int, str], Any] = {}
-        self.graphs: dict[tuple[Any, ...], Any] = {}
+        # njmax=0 is possible, but then Euler and implicitfast do not accelerate
+        self.data = mujoco_warp.make_data(self.bare, nconmax=0, njmax=1)
+
+    def put_models(self) -> None:
+        super().put_models()
+        self.graphs: dict[str, Any] = {}  # of recorded kernels, by what they compute
+        # without damping and stiffness, which are part of the force
+        none = [self.warp.zeros_like(getattr(self.first, name)) for name in ("dof_damping", "jnt_stiffness")]
+        self.undamped = replace(self.first, dof_damping=none[0], jnt_stiffness=none[1])
 
     def put_model(self, model: Any) -> Any:
         return self.engine.put_model(model)
 
-    def held(self, name: str) -> Array:
-        values: Array = attrgetter(name)(next(iter(self.models.values()))).numpy()
-        return values[0]  # all worlds share it
+    def held(self, model: Any, name: str) -> Array:
+        return np.asarray(attrgetter(name)(model).numpy()[0])  # all worlds share it
 
-    @cached_property
-    def model(self) -> Any:
-        """The model without damping and stiffness, which are part of the force."""
-        model = next(iter(self.models.values()))
-        none = [self.warp.zeros_like(field) for field in (model.dof_damping, model.jnt_stiffness)]
-        return replace(model, dof_damping=none[0], jnt_stiffness=none[1])
+    def place(self, *start: Array) -> None:
+        """Give the data a state: qpos, qvel and applied force."""
+        for field, values in zip((self.data.qpos, self.data.qvel, self.data.qfrc_applied), start):
+            field.assign(np.asarray(values, np.float32)[None])
 
-    def data_at(self, start: Sequence[Array], bare: Bare | None = None) -> Any:
-        """Data of as many worlds as there are states qpos, qvel and force (worlds, n). bare: with actuators that act."""
-        source = bare or self.bare
-        key = id(source), len(start[0]), str(self.warp.get_device())
-        if key not in self.worlds:
-            # njmax=0 is possible, but then Euler and implicitfast do not accelerate
-            self.worlds[key] = self.engine.make_data(source.model, len(start[0]), nconmax=0, njmax=1)
-        data, controls = self.worlds[key], source.engaged
-        fields = data.qpos, data.qvel, data.qfrc_applied, data.ctrl, data.act
-        for field, values in zip(fields, (*start, controls.ctrl, controls.act)):
-            field.assign(np.broadcast_to(np.asarray(values, np.float32), field.shape))
-        return data
-
-    def replay(self, name: str, call: Callable[[Any], object], data: Any) -> Callable[[], None]:
-        """A function that repeats a call for these data; the kernels that it launches are recorded once."""
-        key = name, id(data)
-        if key not in self.graphs:
-            call(data)  # compiles
+    def replay(self, name: str, call: Callable[[Any], object]) -> Callable[[], None]:
+        """A function that repeats a call for the data; the kernels that it launches are recorded once."""
+        if name not in self.graphs:
+            call(self.data)  # compiles
             with self.warp.ScopedCapture() as capture:
-                call(data)
-            self.graphs[key] = capture.graph
-        return lambda: self.warp.capture_launch(self.graphs[key])
+                call(self.data)
+            self.graphs[name] = capture.graph
+        return lambda: self.warp.capture_launch(self.graphs[name])
 
-    def forward(self, at: State, force: Array | None = None) -> Any:
+    def forward(self, at: State, force: Array) -> Any:
         """Data after forward dynamics at a state."""
-        force = np.zeros_like(at.u) if force is None else force
-        data = self.data_at([at.x[None], at.u[None], force[None]])
-        self.replay("forward", lambda data: self.engine.forward(self.model, data), data)()
-        return data
+        forward = self.replay("forward", lambda data: self.engine.forward(self.undamped, data))
+        self.place(at.x, at.u, force)
+        forward()
+        return self.data
 
     def mass_matrix(self, at: State) -> Array:
-        M, model = np.zeros((at.u.size, at.u.size)), self.model
+        M, model = np.zeros((at.u.size, at.u.size)), self.undamped
         row, column = np.repeat(np.arange(at.u.size), model.M_rownnz.numpy()), model.M_colind.numpy()
-        M[row, column] = M[column, row] = self.forward(at).M.numpy()[0]  # the lower triangle, row by row
+        M[row, column] = M[column, row] = self.forward(at, 0.0 * at.u).M.numpy()[0]  # the lower triangle, row by row
         return M
 
     def bias(self, at: State) -> Array:
-        return np.array(self.forward(at).qfrc_bias.numpy()[0])
+        return np.array(self.forward(at, 0.0 * at.u).qfrc_bias.numpy()[0])
 
     def acceleration(self, at: State, force: Array) -> Array:
         return np.array(self.forward(at, force).qacc.numpy()[0])
 
     def step_alone(self, course: Course) -> Callable[[], None]:
-        bare, model, tau = self.of_course(course)
-        return self.begun(bare, model, self.placed(course.q, course.v, tau), course)[0]
+        return self.begun(self.model_of(course), self.placed(course.q, course.v, course.tau), course)
 
-    def begun(
-        self, bare: Bare, model: Any, start: list[Array], course: Course
-    ) -> tuple[Callable[[], None], Any]:
-        """A step from a start and on, by the kernels that were recorded, and the data. start: of a world or of several."""
-        worlds = [np.atleast_2d(values) for values in start]
-        data = self.data_at(worlds, bare)
+    def begun(self, model: Any, start: list[Array], course: Course) -> Callable[[], None]:
+        """A step from a start and on, by the kernels that were recorded."""
         model.opt.timestep.fill_(course.dt)
-        advance = self.replay(course.method, partial(self.engine.step, model), data)
-        self.data_at(worlds, bare)  # the recording has moved them
-        return advance, data
+        advance = self.replay(course.method, partial(self.engine.step, model))
+        self.place(*start)  # the recording has moved them
+        return advance
 
-    def batch(self, course: Course) -> tuple[Callable[[], Array], str]:
-        """On Warp's preferred device, which may be a GPU; each step is a graph of kernels that was recorded once."""
-        device, start = self.warp.get_preferred_device(), self.placed(course.q, course.v, course.tau)
-        with self.warp.ScopedDevice(device):
-            model = self.models[course.method]
-            if not device.is_cpu:
-                model = self.made_models(self.bare)[course.method]
-            advance, data = self.begun(self.bare, model, start, course)
-
-        def run() -> Array:
-            with self.warp.ScopedDevice(device):
-                self.data_at(start)
-                for _ in range(course.steps):
-                    advance()
-                self.warp.synchronize_device(device)
-            return np.asarray(data.qpos.numpy()[0, self.bare.qpos])
-
-        return run, str(device.name)
-
-    def path(self, bare: Bare, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
-        (advance, data), states = self.begun(bare, model, start, course), []
+    def path(self, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
+        advance, states = self.begun(model, start, course), []
         for _ in course.times[1:]:
             for _ in range(course.every):
                 advance()
             # on a CPU the arrays are views
-            states.append((data.qpos.numpy()[0].copy(), data.qvel.numpy()[0].copy()))
+            states.append((self.data.qpos.numpy()[0].copy(), self.data.qvel.numpy()[0].copy()))
         qpos, qvel = map(np.array, zip(*states))
         return qpos, qvel
+
+
+class Stepper(as_it_runs.Stepper):
+    def __init__(self, file: File, model: Any):
+        import warp
+
+        warp.config.log_level = warp.LOG_ERROR
+        warp.set_device("cpu")
+        import mujoco_warp
+
+        self.engine, self.model, self.put_model = mujoco_warp, model, mujoco_warp.put_model(model)
+
+    def put(self, data: Any) -> Any:
+        return self.engine.put_data(self.model, data, nconmax=MOST_CONTACTS, njmax=MOST_ROWS)
+
+    def step(self, data: Any) -> Any:
+        self.engine.step(self.put_model, data)
+        return data
+
+    def get(self, data: Any) -> Any:
+        from mujoco import MjData
+
+        values = MjData(self.model)
+        self.engine.get_data_into(values, self.model, data)
+        return values

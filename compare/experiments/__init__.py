@@ -58,5 +58,5 @@ def skipped(name: str, robot: "Robot", engines: str | None = None) -> Finding | 
     asked = EXPERIMENTS[name].asks_of_own if robot.own else None
     if asked and not {*asked} & {*robot.own}:
         return Finding("shared", "nothing_given", {"asked": asked})
-    takes_part = engines and "--engines" in EXPERIMENTS[name].options and {*engines.split(",")} <= {*ALWAYS}
-    return None if takes_part else functions(name).skipped(robot)
+    is_without = engines and EXPERIMENTS[name].asks_others and {*engines.split(",")} <= {*ALWAYS}
+    return Finding(name, "none_chosen", {"engines": engines}) if is_without else functions(name).skipped(robot)

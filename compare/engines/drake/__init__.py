@@ -1,6 +1,6 @@
 """Drake's MultibodyPlant of a robot's file; only where pydrake is installed (the extra `drake`)."""
 
-from pathlib import Path
+import logging
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,9 @@ from ...robots.coordinates import point_inertia
 from .. import Array, Course, EngineRecord
 from ..outside.bodies import Body, Link
 from ..outside.file import File, OtherJoints, OtherNames
-from ..outside.mjcf_text import original_or_copy
 from ..outside.model import ReadModel
 from ..outside.order import ANGLES, Order, State, of_free
-from .plant import add_passive, fixed_force, joints_of, parsed
-from .simulation import DISCRETE, SCHEMES, Simulation
+from .simulation import DISCRETE, SCHEMES, Simulation, fixed_force
 
 ENGINE = EngineRecord(
     order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", reads_file=True
@@ -34,32 +32,13 @@ def methods_for(tree: Tree) -> dict[str, tuple[int | None, str]]:
 
 
 class Model(ReadModel):
-    has_links = True
+    """Plants of the file: one without damping and springs, which are part of the force there, for single states."""
 
     def __init__(self, file: File, precision: str):
         self.file = file
         self.inertias: dict[Any, Any] = {}  # of bodies that are set
         self.simulated: tuple[object, ...] | None = None  # what the last simulation is of
-        self.dual: tuple[Any, Any] | None = None  # the plant over dual numbers, and a context
-        plant, self.source, self.copied = original_or_copy(file.path, self.read)
-        joints = {k: plant.get_joint(index) for index, k in self.joints.items()}
-        starts = {k: (joint.position_start(), joint.velocity_start()) for k, joint in joints.items()}
-        for k, (q, v) in list(starts.items()):
-            starts |= of_free(k, (q + 4, v + 3), (q, v)) if file.is_free(k) else {}
-        self.order = Order(file, starts, ball=ANGLES, angular_in_world=True, balls_in_parent=True)
-        armature, damping = np.zeros((2, file.coordinates.nv))
-        for joint in joints.values():
-            place = self.order.v[joint.velocity_start() :][: joint.num_velocities()]
-            armature[place] = self.rotors.get(joint.name(), 0.0)
-            damping[place] = joint.default_damping_vector()
-        gravity, stiffness = plant.gravity_field().gravity_vector(), np.zeros_like(armature)
-        self.used = {"gravity": gravity, "armature": armature, "damping": damping, "stiffness": stiffness}
-        self.settle()
-
-    def read(self, path: Path) -> Any:
-        """The plant of a file, as it is, and the numbers of its joints in the Tree: of a free body that of its ball."""
-        file = self.file
-        plant, self.rotors = parsed(path, 0.0, bool(file.free))
+        plant, rotors = self.parsed(0.0)
         plant.Finalize()
         joints = joints_of(plant)
         free = [joint.index() for joint in joints if joint.num_velocities() == 6]  # called as their bodies
@@ -71,27 +50,67 @@ class Model(ReadModel):
             raise OtherJoints(plant.num_velocities(), file.coordinates.nv)
         if missing := [name for name in expected if name not in names.values()]:
             raise OtherNames(f"it has no joint {missing[0]!r}")
+        # the numbers of its joints in the Tree: of a free body that of its ball
         self.joints = {index: expected[name] for index, name in names.items()}
-        return plant
+        starts, armature, damping = {}, *np.zeros((2, file.coordinates.nv))
+        for joint, k in zip(map(plant.get_joint, self.joints), self.joints.values()):
+            q, v = joint.position_start(), joint.velocity_start()
+            starts |= of_free(k, (q + 4, v + 3), (q, v)) if file.is_free(k) else {k: (q, v)}
+        self.order = Order(file, starts, ball=ANGLES, angular_in_world=True, balls_in_parent=True)
+        for joint in map(plant.get_joint, self.joints):
+            place = self.order.v[joint.velocity_start() :][: joint.num_velocities()]
+            armature[place] = rotors.get(joint.name(), 0.0)
+            damping[place] = joint.default_damping_vector()
+        gravity, stiffness = plant.gravity_field().gravity_vector(), np.zeros_like(armature)
+        self.used = {"gravity": gravity, "armature": armature, "damping": damping, "stiffness": stiffness}
+        self.rest = np.zeros(file.coordinates.nq)
+        self.settle()
+
+    def parsed(self, dt: float) -> tuple[Any, dict[str, float]]:
+        """A plant that is not final, without actuators, limits and constraints; and the rotors of joints, by name."""
+        from pydrake.multibody.parsing import Parser
+        from pydrake.multibody.plant import MultibodyPlant
+
+        logging.getLogger("drake").setLevel(logging.CRITICAL)  # set by importing pydrake
+        plant, path, kind = MultibodyPlant(dt), self.file.path, "urdf" if self.file.is_urdf else "xml"
+        parser, is_known = Parser(plant), path.suffix == f".{kind}"  # Drake knows a URDF by its name alone
+        text = "" if is_known else path.read_text(encoding="utf-8")
+        instances = parser.AddModels(str(path)) if is_known else parser.AddModelsFromString(text, kind)
+        if not self.file.free:  # Drake would free the base of a URDF
+            bodies = {body for instance in instances for body in plant.GetBodyIndices(instance)}
+            for body in bodies - {joint.child_body().index() for joint in joints_of(plant)}:
+                plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame())
+        rotors = {}
+        for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
+            rotors[actuator.joint().name()] = actuator.default_reflected_inertia()  # of several the last counts
+            plant.RemoveJointActuator(actuator)
+        for constraint in plant.GetConstraintIds():
+            plant.RemoveConstraint(constraint)
+        for joint in joints_of(plant):
+            unlimited = np.full(joint.num_positions(), np.inf)
+            joint.set_position_limits(-unlimited, unlimited)
+        return plant, rotors
 
     def plant_of(self, dt: float, has_springs: bool) -> Any:
-        """A final plant with the gravity, armature and springs that are used."""
-        plant, _ = parsed(self.source, dt, bool(self.file.free))
+        """A final plant with the gravity, rotors and springs that are used."""
+        from pydrake.multibody.tree import PrismaticSpring, RevoluteSpring
+
+        plant, _ = self.parsed(dt)
         plant.mutable_gravity_field().set_gravity_vector(self.used["gravity"])
         for index, k in self.joints.items():
-            place = self.file.coordinates.places.joints[k]
-            if place.kind != "ball":
-                armature, stiffness = (
-                    float(self.used[name][place.qd.start]) for name in ("armature", "stiffness")
-                )
-                spring = (stiffness, self.stated["rest"][place.q.start]) if has_springs else (0.0, 0.0)
-                add_passive(plant, plant.get_joint(index), armature, *spring)
+            joint, place = plant.get_joint(index), self.file.coordinates.places.joints[k]
+            armature, stiffness = (float(self.used[name][place.qd.start]) for name in ("armature", "stiffness"))
+            if armature:
+                plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(armature)
+            if stiffness and has_springs:
+                spring = RevoluteSpring if joint.type_name() == "revolute" else PrismaticSpring
+                plant.AddForceElement(spring(joint, self.rest[place.q.start], stiffness))
         plant.Finalize()
         return plant
 
     def settle(self) -> None:
-        """Make the plant of single states, without damping and springs, which act as part of the force there."""
-        self.simulated = self.dual = None
+        """Make the plant of single states."""
+        self.simulated = None
         self.plant = self.plant_of(0.0, has_springs=False)
         self.context = self.plant.CreateDefaultContext()
         self.set_numbers(self.plant, self.context, acts=False)
@@ -106,13 +125,15 @@ class Model(ReadModel):
         for index, inertia in self.inertias.items():
             plant.get_body(index).SetSpatialInertiaInBodyFrame(context, inertia)
 
-    def apply(self, name: str) -> None:
+    def set(self, name: str, values: Array) -> None:
+        """Balls have no rotor and no spring, and the damping of a free body is in other axes: they are left as they are."""
+        is_left = np.zeros(np.shape(values), bool)
+        if name != "gravity":
+            is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
+            is_left = self.order.is_of_free() | (is_of_ball & (name != "damping"))
+        self.rest = self.stated["rest"]
+        self.used[name] = np.where(is_left, self.used[name], values)
         self.settle()
-
-    def unable(self, name: str) -> Array:
-        """Balls have no rotor and no spring, and the damping of a free body is in other axes."""
-        is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
-        return self.order.is_of_free() | (is_of_ball & (name != "damping"))
 
     def links(self, at: State) -> list[Link]:
         from pydrake.multibody.tree import BodyIndex
@@ -131,16 +152,15 @@ class Model(ReadModel):
             links.append(Link(index, parent, number, *place, Body(mass, com, about_com)))
         return links
 
-    def set_body(self, link: Link, body: Body) -> bool:
+    def set_body(self, link: Link, body: Body) -> None:
         from pydrake.multibody.tree import BodyIndex, RotationalInertia, SpatialInertia
 
-        inertia, axes = SpatialInertia.Zero(), np.triu_indices(3, 1)
+        inertia = SpatialInertia.Zero()
         if body.mass:
-            tensor = RotationalInertia(*np.diag(body.inertia), *body.inertia[axes])
+            tensor = RotationalInertia(*np.diag(body.inertia), *body.inertia[np.triu_indices(3, 1)])
             inertia = SpatialInertia.MakeFromCentralInertia(body.mass, body.com, tensor)
         self.inertias[BodyIndex(link.name)] = inertia
         self.set_numbers(self.plant, self.context, acts=False)
-        return True
 
     def mass_matrix(self, at: State) -> Array:
         self.plant.SetPositions(self.context, at.x)
@@ -156,39 +176,21 @@ class Model(ReadModel):
         self.force.SetFromVector(force)
         return np.array(self.forward_dynamics.Eval(self.context))
 
-    @property
-    def quantities(self) -> tuple[str, ...]:
-        """Quaternions do not move like numbers, nor do the angles of a ball."""
-        return super().quantities + ("derivatives",) * (not self.file.coordinates.has_balls)
-
-    def derivatives(self, at: State, force: Array) -> Array:
-        """By AutoDiffXd, Drake's dual numbers."""
-        from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
-
-        n, values = at.u.size, InitializeAutoDiff(np.concatenate([at.x, at.u, force]))[:, 0]
-        if self.dual is None:
-            plant = self.plant.ToAutoDiffXd()
-            self.dual = plant, plant.CreateDefaultContext()
-        plant, context = self.dual
-        context.SetTimeStateAndParametersFrom(self.context)
-        plant.SetPositionsAndVelocities(context, values[: 2 * n])
-        plant.get_applied_generalized_force_input_port().FixValue(context, values[2 * n :])
-        accelerations = plant.get_generalized_acceleration_output_port().Eval(context)
-        return np.array(np.split(ExtractGradient(accelerations), 3, axis=1))
-
     def prepare(self, course: Course) -> None:
         self.simulation(course)
 
     def simulation(self, course: Course) -> Simulation:
         """That of a course; the last one is kept."""
-        setting = course.method, course.dt, course.steps, course.tolerance
-        key = *setting, course.tau.tobytes(), course.servos is None
+        key = course.method, course.dt, course.steps, course.tolerance, course.tau.tobytes()
         if key != self.simulated:
-            dt = course.dt if course.method == DISCRETE else 0.0
-            plant = self.plant_of(dt, has_springs=True)
+            plant = self.plant_of(course.dt if course.method == DISCRETE else 0.0, has_springs=True)
             self.simulated, self.last = key, Simulation(plant, self.order, course)
             self.set_numbers(plant, self.last.context, acts=True)
         return self.last
 
     def run(self, course: Course) -> tuple[Array, int]:
         return self.simulation(course).run(course)
+
+
+def joints_of(plant: Any) -> list[Any]:
+    return [plant.get_joint(index) for index in plant.GetJointIndices()]

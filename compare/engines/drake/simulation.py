@@ -6,7 +6,6 @@ import numpy as np
 
 from .. import Array, Course
 from ..outside.order import Order
-from .plant import fixed_force
 
 SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
            "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
@@ -25,10 +24,9 @@ class Simulation:
         self.plant, self.order = plant, order
         is_of_ball = np.array(order.file.coordinates.kinds_of_speeds) == "ball"
         turns = course.tau[order.is_of_free() | is_of_ball].any()
-        is_constant = course.servos is None and not turns
-        simulator = self.simulator = Simulator(plant if is_constant else self.with_force(course))
+        simulator = self.simulator = Simulator(self.with_force(course) if turns else plant)
         self.context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-        if is_constant:
+        if not turns:
             fixed_force(plant, self.context).SetFromVector(course.tau[order.v])
         if course.method != DISCRETE:
             scheme = SCHEMES[course.method.removesuffix(" adaptive")][1]
@@ -45,8 +43,8 @@ class Simulation:
 
         def set_force(context: Any, output: Any) -> None:
             state = forces.get_input_port().Eval(context)
-            q, v = order.tree_state(state[:nq], state[nq:])
-            output.SetFromVector(order.state(q).force(course.force(q, v)))
+            q, _ = order.tree_state(state[:nq], state[nq:])
+            output.SetFromVector(order.state(q).force(course.tau))
 
         forces, builder = LeafSystem(), DiagramBuilder()
         forces.DeclareVectorInputPort("state", self.plant.num_multibody_states())
@@ -75,3 +73,9 @@ class Simulation:
             states.append(np.concatenate(reached))
         evaluations = self.simulator.get_integrator().get_num_derivative_evaluations()
         return np.array(states), course.steps if is_discrete else evaluations
+
+
+def fixed_force(plant: Any, context: Any) -> Any:
+    """The vector of generalized forces in a context, in Drake's order and axes."""
+    port = plant.get_applied_generalized_force_input_port()
+    return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()

@@ -3,8 +3,9 @@
 import importlib
 import time
 from collections.abc import Callable
-from functools import cache, partial
-from typing import Any, TypeVar
+from functools import cache
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,57 +16,73 @@ from ...core.errors import described
 from ...core.words import in_one_line
 from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course, Motion
-from .bodies import numbers_of, size_of
+from .bodies import OF_BODIES, Numbers, size_of
 from .file import EngineError, File, Unread
-from .model import ReadModel
+from .model import Reading, ReadModel
 
-CALLS = 50  # at most, that are timed
+if TYPE_CHECKING:
+    from .as_it_runs import Run
+
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 T = TypeVar("T")
 
 
-def answer(act: Callable[..., T], name: str, file: File, tree: tmt.Tree, is_set: bool, *arguments: Any) -> T:
-    """What a function of an engine's model of a file returns; EngineError with the reason, in one line, where it raises."""
-    kind: type[EngineError] = Unread
+def answer(act: Callable[..., T], *arguments: Any) -> T:
+    """act(*arguments); EngineError with the reason, in one line, where it raises."""
     try:
-        model = read(name, file, tree, is_set)
-        kind = EngineError
-        return act(model, *arguments)
+        return act(*arguments)
     except EngineError:
         raise
     except (Exception, SystemExit) as error:  # the latter by assertions of Drake
-        raise kind(in_one_line(" ".join(described(error, with_place=kind is EngineError).split()))) from None
+        kind = Unread if act is reading else EngineError
+        raise kind(in_one_line(" ".join(described(error, with_place=act is not reading).split()))) from None
+
+
+def module_of(name: str) -> ModuleType:
+    """The module of an engine, by the name of its record."""
+    return importlib.import_module(f"..{RECORDS[name].module or name}", __package__)
 
 
 @cache
-def read(name: str, file: File, tree: tmt.Tree, is_set: bool) -> ReadModel:
-    """The model of an engine; is_set: the numbers that differ from those of the Tree are set. Once in a process."""
-    begin = time.perf_counter()
-    record = RECORDS[name]
-    module = importlib.import_module(f"..{record.module or name}", __package__)
-    kind: type[ReadModel] = module.Model
+def read(name: str, file: File, tree: tmt.Tree) -> tuple[ReadModel, Reading]:
+    """The model of an engine, with the Tree's numbers as far as they can be set. Once in a process."""
+    begin, record = time.perf_counter(), RECORDS[name]
+    kind: type[ReadModel] = module_of(name).Model
     model = kind(file, record.precision)
-    model.stated = stated = numbers_of(tree)
+    model.stated = stated = model.numbers_stated(tree)
     numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
+    lacking = [number for number in ("damping", "stiffness") if number not in numbers and stated[number].any()]
+    differing = differences(numbers, stated, record.eps)
+    for number in differing:
+        if number not in OF_BODIES:
+            model.set(number, stated[number])
+    if {*differing} & {*OF_BODIES}:  # where places alone differ, bodies are displaced, and their mass is right
+        moments = (np.linalg.eigvalsh(values["inertia"]) for values in (numbers, stated))
+        is_other = np.abs(np.subtract(*moments)).max(axis=1) > FACTOR * record.eps * size_of(stated, "inertia")
+        is_other |= np.abs(numbers["mass"] - stated["mass"]) > FACTOR * record.eps * size_of(stated, "mass")
+        model.set_bodies(np.flatnonzero(is_other).tolist())
+    not_set = differences(model.numbers(), stated, record.eps) if differing else ()
+    seconds = time.perf_counter() - begin
+    return model, Reading(numbers, stated, tuple(lacking), differing, not_set, seconds)
+
+
+def differences(numbers: Numbers, stated: Numbers, eps: float) -> tuple[str, ...]:
+    """The names of the numbers that differ from those stated by more than the rounding of what is added."""
     differing = []
     for number, values in numbers.items():
-        most = np.abs(values - stated[number]).max(initial=0.0)
-        if not most <= FACTOR * record.eps * size_of(stated, number):
+        largest = np.abs(values - stated[number]).max(initial=0.0)
+        if not largest <= FACTOR * eps * size_of(stated, number):
             differing.append(number)
-    mended = {number: is_set and model.mend(number, stated[number]) for number in differing}
-    unwritten = tuple(number for number in model.unwritten if mended.get(number))
-    model.reading = {
-        "read": numbers, "stated": stated, "copied": model.copied, "way": model.way, "unwritten": unwritten,
-        "mended": {number: is_right for number, is_right in mended.items() if number not in unwritten},
-        "lacking": tuple(number for number in model.drops if stated[number].any()),
-        "has": set(model.quantities),
-        "seconds": time.perf_counter() - begin,
-    }  # fmt: skip
-    return model
+    return tuple(differing)
 
 
-def each(model: ReadModel, quantity: str, *values: Array) -> Array:
+def reading(name: str, file: File, tree: tmt.Tree) -> Reading:
+    return read(name, file, tree)[1]
+
+
+def each(name: str, file: File, tree: tmt.Tree, quantity: str, *values: Array) -> Array:
     """A quantity at many states of the Tree, (states, ...)."""
+    model, _ = read(name, file, tree)
     return np.array([value(model, quantity, *state) for state in zip(*values)], dtype=float)
 
 
@@ -73,26 +90,17 @@ def value(
     model: ReadModel, quantity: str, q: Array, v: Array | None = None, force: Array | None = None
 ) -> Array:
     at = model.order.state(q, v)
-    own_force = at.force(np.zeros_like(at.u) if force is None else force)
     if quantity == "mass_matrix":
         return at.S.T @ model.mass_matrix(at) @ at.S
     if quantity == "bias":
         return at.S.T @ model.bias(at)
-    if quantity == "acceleration":
-        return np.linalg.solve(at.S, model.acceleration(at, own_force) - at.c)
-    return np.array([at.S.T @ by @ at.S for by in model.derivatives(at, own_force)])  # S is a permutation
+    own_force = at.force(np.zeros_like(at.u) if force is None else force)
+    return np.linalg.solve(at.S, model.acceleration(at, own_force) - at.c)
 
 
-def seconds_of_derivatives(model: ReadModel, q: Array, v: Array, force: Array) -> float:
-    """Of one call of the engine, the shortest."""
-    at = model.order.state(q, v)
-    call = partial(model.derivatives, at, at.force(force))
-    return timing.fastest({"": call}, CALLS)[""]
-
-
-def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:
+def prepared(name: str, file: File, tree: tmt.Tree, course: Course) -> tuple[float, float | None]:
     """Seconds until a run could begin; and of a step without what Python does around it, None where that is nothing."""
-    begin = time.perf_counter()
+    begin, (model, _) = time.perf_counter(), read(name, file, tree)
     model.prepare(course)
     seconds = time.perf_counter() - begin
     step = model.step_alone(course) if course.steps else None
@@ -107,16 +115,9 @@ def prepared(model: ReadModel, course: Course) -> tuple[float, float | None]:
     return seconds, timing.fastest({"": steps}, 5)[""] / count
 
 
-def batched(model: ReadModel, course: Course) -> tuple[float, float, str, np.ndarray]:
-    """Seconds of preparation and of the steps of many worlds, the device, and q of the first world."""
-    begin = time.perf_counter()
-    run, device = model.batch(course)
-    q = run()
-    seconds = time.perf_counter() - begin
-    return seconds, timing.fastest({"": run}, 5)[""], device, q
-
-
-def ran(model: ReadModel, course: Course) -> Motion:
+def ran(name: str, file: File, tree: tmt.Tree, course: Course) -> Motion:
+    """A run, timed in this process."""
+    model, _ = read(name, file, tree)
     begin, why = time.perf_counter(), "a number is not finite"
     states, evaluations = course.start[None], None
     try:
@@ -125,3 +126,13 @@ def ran(model: ReadModel, course: Course) -> Motion:
         why = str(error)
     motion = course.motion(np.asarray(states, float), why)
     return motion._replace(evaluations=evaluations, seconds=time.perf_counter() - begin)
+
+
+def runs_as_it_is(name: str, file: File, tree: tmt.Tree) -> "list[Run]":
+    """The file's own run in an engine that steps MuJoCo's model; none in another one."""
+    kind = getattr(module_of(name), "Stepper", None)
+    if kind is None:
+        return []
+    from .as_it_runs import runs
+
+    return runs(kind, RECORDS[name].precision, file)

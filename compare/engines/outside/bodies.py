@@ -1,20 +1,25 @@
-"""The numbers of bodies and joints: those of a Tree, and those that follow from an engine's links, in the same shapes."""
+"""The numbers of bodies and joints: those of a Tree and those of an engine's links, found in the same way."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import tmt
 from tmt.derivation.method import joint_frames
 from tmt.methods import by_speed
 
 from ...robots.case import SEED
-from ...robots.coordinates import Coordinates, free_joints, point_inertia
+from ...robots.coordinates import Coordinates, point_inertia
 from .. import Array
 
 Numbers = Mapping[str, Array]
 STILL = 1e-3  # rad or m: what a movement of 1 moves goes further
+CUTOFF = 1e-3  # of the singular values of 1 - R: along the axis of a turn R any point is fixed
+OF_BODIES = "mass", "com", "inertia", "axis", "anchor", "com_moved"
+OF_JOINTS = "gravity", "armature", "damping", "stiffness"
 
 
 class Body(NamedTuple):
@@ -47,31 +52,19 @@ class Link(NamedTuple):
 
 
 def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
-    """The Tree's numbers in the shapes of ReadModel.numbers; and about_origin (joints,): mass x com^2 from the joint, kg m2."""
-    nv, zero = tree.coordinates.nv, np.array(tree.zero)
-    moved = Coordinates(tree.joint_names, tree.kind).random(np.random.default_rng(SEED), 1)[0]
-    (mass, com, inertia, origins, axis), of_moved = placed(tree, zero), placed(tree, moved)
-    numbers = {"mass": mass, "com": com, "moments": np.linalg.eigvalsh(inertia), "inertia": inertia}
-    numbers |= {"axis": axis, "com_moved": of_moved[1], "axis_moved": of_moved[4], "moved": moved}
-    has_anchor = np.array([[kind != "slide"] for kind in tree.kind])
-    numbers |= {"anchor": origins * has_anchor, "anchor_moved": of_moved[3] * has_anchor}
-    for first in free_joints(tree):  # their speeds are in no engine those of an axis
-        for name in ("axis", "anchor", "axis_moved", "anchor_moved"):
-            numbers[name][first : first + 4] = 0.0
+    """The Tree's numbers, in the shapes of ReadModel.numbers; and
+
+    reference, moved: (nq,) the positions of body_numbers; rest: (nq,) of springs; levers: (bodies,) mass x com^2, kg m2.
+    """
+    coordinates = Coordinates(tree.joint_names, tree.kind)
+    postures = np.array(tree.zero), coordinates.random(np.random.default_rng(SEED), 1)[0]
+    numbers = body_numbers(partial(links_of, tree), coordinates, *postures)
     speeds = {"armature": tree.armature, "damping": tree.damping, "stiffness": by_speed(tree, tree.stiffness)}
     for name, values in speeds.items():
-        numbers[name] = np.broadcast_to(np.array(values or 0.0, float), nv)
-    numbers["about_origin"] = mass * ((com - origins) ** 2).sum(axis=1)
-    others = {"gravity": tree.gravity, "rest": tree.rest, "reference": tree.zero}
-    return numbers | {name: np.array(values, float) for name, values in others.items()}
-
-
-def placed(tree: tmt.Tree, q: Array) -> tuple[Array, ...]:
-    """mass, com and inertia of ReadModel.numbers at positions q of a Tree; origin and axis of each joint, (joints, 3)."""
-    frames = joint_frames(tree, q.tolist())
-    axes = [[0.0] * 3 if kind == "ball" else [*frame.axes[0]] for kind, frame in zip(tree.kind, frames)]
-    origins = np.array([[*frame.origin] for frame in frames])
-    return *together(links_of(tree, q), len(frames)), origins, np.array(axes)
+        numbers[name] = np.broadcast_to(np.array(values or 0.0, float), coordinates.nv)
+    levers = [mass * float(np.dot(com, com)) for mass, com in zip(tree.mass, tree.com)]
+    numbers |= {"reference": postures[0], "moved": postures[1], "levers": np.array(levers)}
+    return numbers | {"gravity": np.array(tree.gravity, float), "rest": np.array(tree.rest, float)}
 
 
 def links_of(tree: tmt.Tree, q: Array) -> list[Link]:
@@ -85,18 +78,42 @@ def links_of(tree: tmt.Tree, q: Array) -> list[Link]:
     return links
 
 
+def body_numbers(
+    links_at: Callable[[Array], Sequence[Link]], coordinates: Coordinates, reference: Array, moved: Array
+) -> dict[str, Array]:
+    """Numbers of bodies and joints, in the world, by what links do; links_at: positions (nq,) -> the links there.
+
+    mass (joints,) kg, com (joints, 3) m and inertia (joints, 3, 3) kg m2 about it, at the positions `reference`: of all bodies
+    together that move with a joint and not with the next one; 0 if there is none. com_moved: com at the positions `moved`. axis
+    (joints, 3): of a hinge or slide at `reference`, by what a movement of 1 rad or 1 m does to the first link that moves; anchor
+    (joints, 3) m: of a hinge, the point of its axis that is nearest to the world's origin; both 0 of a ball.
+    """
+    before, joints = links_at(reference), coordinates.places.joints
+    mass, com, inertia = together(before, len(joints))
+    _, com_moved, _ = together(links_at(moved), len(joints))
+    axis, anchor = np.zeros((2, len(joints), 3))
+    for k, joint in enumerate(joints):
+        if joint.kind == "ball":
+            continue
+        turn, shift = movement(before, links_at(coordinates.move(reference, np.eye(coordinates.nv)[joint.qd.start])))
+        axis[k] = shift if joint.kind == "slide" else Rotation.from_matrix(turn).as_rotvec()
+        if joint.kind == "hinge":
+            anchor[k] = np.linalg.pinv(np.eye(3) - turn, CUTOFF) @ shift
+    return {"mass": mass, "com": com, "inertia": inertia, "axis": axis, "anchor": anchor, "com_moved": com_moved}
+
+
 def size_of(stated: Numbers, number: str) -> float:
-    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a joint.
+    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a link.
 
     Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may round.
     """
     largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in stated.items()}
-    if number in ("moments", "inertia"):
-        return largest[number] + largest["about_origin"]
-    if number.startswith("axis"):
-        return len(stated[number]) * 1.0
-    if number.startswith(("com", "anchor")):
-        return len(stated[number]) * (largest[number] + largest["com"] + largest["anchor"])
+    if number == "inertia":
+        return largest[number] + largest["levers"]
+    if number == "axis":
+        return float(len(stated[number]))
+    if number in ("com", "com_moved", "anchor"):
+        return len(stated[number]) * (largest["com"] + largest["com_moved"] + largest["anchor"])
     return largest[number]
 
 
@@ -113,7 +130,7 @@ def movers(links: Sequence[Link]) -> list[int | None]:
 
 
 def together(links: Sequence[Link], joints: int) -> tuple[Array, Array, Array]:
-    """mass, com and inertia of ReadModel.numbers."""
+    """mass, com and inertia of body_numbers, of links at a posture."""
     bodies: list[list[Body]] = [[] for _ in range(joints)]
     for link, joint in zip(links, movers(links)):
         if joint is not None:
@@ -136,8 +153,7 @@ def combined(parts: Sequence[Body]) -> Body:
     mass, tensor = sum((body.mass for body in parts), 0.0), np.zeros((3, 3))
     centre = sum((body.mass * body.com for body in parts), np.zeros(3)) / (mass or 1.0)
     for m, com, inertia in parts:
-        d = com - centre
-        tensor += inertia + point_inertia(d, m)
+        tensor += inertia + point_inertia(com - centre, m)
     return Body(mass, centre, tensor)
 
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 from ...robots.coordinates import Coordinates
 
@@ -13,6 +14,7 @@ class File(NamedTuple):
     # of the joints; a free joint b is `b x`, `b y`, `b z` (slides) and `b turn` (a ball)
     names: tuple[str, ...]
     kinds: tuple[str, ...]  # hinge, slide or ball
+    is_urdf: bool = False  # by its root element, whatever its name
 
     @property
     def coordinates(self) -> Coordinates:
@@ -28,7 +30,13 @@ class File(NamedTuple):
     @property
     def floating(self) -> bool:
         """Whether the base of a URDF is free, by its own joint or by --floating."""
-        return self.path.suffix == ".urdf" and bool(self.free)
+        return self.is_urdf and bool(self.free)
+
+    @property
+    def is_freed(self) -> bool:
+        """Whether the base of a URDF is free by --floating alone."""
+        joints = ElementTree.parse(self.path).iter("joint") if self.floating else ()
+        return self.floating and "floating" not in {joint.get("type") for joint in joints}
 
     def is_free(self, joint: int) -> bool:
         """Whether a joint of the Tree is the ball of a free joint."""
@@ -56,10 +64,6 @@ class OtherJoints(EngineError):
 
 class OtherNames(EngineError):
     """An engine gives a joint another name, by which this program does not find it."""
-
-
-class Unwritten(EngineError):
-    """This program cannot write a URDF of the robot for the engine, which was not asked."""
 
 
 class TooLong(EngineError):

@@ -1,43 +1,39 @@
-"""Other engines that read the robot's file: what each has read, its equations, its integrators, and which to use."""
+"""Other engines: do they read the same numbers of the file, compute the same M, h and accelerations, and run it as it is?"""
 
-import os
-from collections.abc import Iterator
-from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tmt.compiled.cores import cores
-
 from ...core.check import ENDS, About, Result
 from ...core.finding import Finding
+from ...core.text import say
 from ...engines import LABELS, RECORDS, EngineRecord
-from ...engines.outside import Outside, OutsideDynamics
-from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unread, Unwritten
-from ...engines.outside.model import FROM_FILE, FROM_URDF
+from ...engines.outside import Outside, OutsideDynamics, answers
+from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unread
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
+from ...judge.run import movement_unit
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...robots.coordinates import free_joints
+from ...robots.coordinates import Coordinates
 from ...robots.states import Sample
 from .. import Experiment
 from ..quantities import QUANTITIES
 from ..setup import Setup
-from . import answer, batches, integrators, servos
-from .causes import joints_lost
-from .motion import free_scene
-from .readings import compare_numbers, file_of
-from .tables import EngineRow, EnginesResult, ReadRow
+from .features import feature_of_speeds
+from .readings import compare_numbers
+from .tables import AnswerRow, EngineRow, EnginesResult, ReadRow, RunRow
 
 EXPERIMENT = Experiment(
-    order=65, serves_own=False, quick_speeds=0, options=("--engines",), first_screen=("answer", "cheapest")
+    order=65, serves_own=False, asks_others=True, quick_speeds=0, options=("--engines",), first_screen=("answer",)
 )
-BUSY = 1.5  # load of a core above which other processes take turns
 COMPARED = ("Mbar", "bias", "qdd")
-TABLES = "answer", "read", "methods", "servos", "batches"
-# their names are kinds in the template
-NOT_ASKED = Unread, OtherJoints, OtherNames, Unwritten, TooLong
+TABLES = "answer", "read", "runs"
+# of which nothing more is said; their names are kinds in the template
+NOT_ASKED = Unread, OtherJoints, OtherNames
+# s, of the first calls of an engine that compiles: so many, and per speed and pair of speeds; measured on two cores
+COMPILATION = 15.0, 1.0, 0.05
 
 
 def skipped(robot: Robot) -> Finding | None:
@@ -47,128 +43,114 @@ def skipped(robot: Robot) -> Finding | None:
 
 
 def rows(setup: Setup) -> EnginesResult:
-    """What each installed engine has read, its M, h and accelerations, its integrators, servos and batches."""
+    """What each installed engine has read, its M, h and accelerations, and the file as it runs there.
+
+    An engine that compiles comes last; what one has found is told when it is known.
+    """
     result = EnginesResult("engines", tables={f"engines_{name}": [] for name in TABLES})
     absent: dict[str, list[str]] = {}
     others = [engine for engine in setup.engines.values() if isinstance(engine, Outside)]
-    for engine in others:
-        label = LABELS[engine.name]
-        try:
-            if reason := engine.unavailable():
-                absent.setdefault(reason, []).append(label)
-            else:
-                compare_engine(result, setup, engine)
-        except NOT_ASKED as error:
-            add_not_asked(result, setup.robot, engine.name, error)
-        except EngineError as error:
-            result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
+    for engine in sorted(others, key=lambda engine: engine.record.compiles):
+        if reason := engine.unavailable():
+            absent.setdefault(reason, []).append(LABELS[engine.name])
+            continue
+        result.answers[LABELS[engine.name]] = {}
+        compare_engine(result, setup, engine)
+        add_answer(result, setup, engine.record)
     for reason, labels in absent.items():
         result.find("absent", engines=labels, reason=reason)
-    for label in result.labels(FROM_URDF):
-        result.find("urdf", engine=label, numbers=list(result.readers[label].unwritten))
-    mujoco = setup.engines["mujoco"]
-    for method in () if others else mujoco.methods.values():
-        integrators.compare_steps(result, setup, mujoco, method)
-    if result.rows or not others:
-        integrators.follow_known(result, setup)
-        for known in (mujoco, setup.engines["tmt"]):
-            servos.follow_step(result, setup, known)
-            batches.time_batches(result, setup, known)
-        servos.add_sentences(result)
-        add_load(result)
-        answer.add_answer(result, free_scene(setup))
+    verdicts = {label: is_same(answer) for label, answer in result.answers.items()}
+    values = {"name": Path(setup.robot.mjcf).name, "verdicts": verdicts, "answers": result.answers}
+    result.headline = result.finding("headline", **values)
+    result.top.insert(0, result.finding("answer", **values))
     return result
 
 
-def add_load(result: EnginesResult) -> None:
-    """A finding where other processes take the cores, where the system tells."""
-    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else 0.0
-    if load > BUSY * cores():
-        result.find("busy", load=load, cores=cores())
+def is_same(answer: dict[str, Any]) -> bool | None:
+    """Whether an engine computes what MuJoCo does; None: it was not judged."""
+    if "why_not" in answer or "equations" not in answer:
+        return None
+    reads, runs = answer["reads"], answer.get("runs")
+    is_run = not runs or "why_not" in runs or any(run.first is None for run in runs["runs"])
+    return not reads["rows"] and not answer["equations"]["differ"] and is_run
 
 
-def add_not_asked(result: EnginesResult, robot: Robot, engine: str, error: EngineError) -> None:
-    """A row and a finding of an engine that takes no part: it refuses the file, or this program does not ask it."""
-    label, reason = LABELS[engine], str(error).rstrip(".")
-    cause = (
-        joints_lost(RECORDS[engine], file_of(robot), error.speeds) if isinstance(error, OtherJoints) else None
-    )
-    result.tables["engines_read"].append(ReadRow(label, cause=cause and str(cause), why_not=str(error)))
-    result.find("not_asked", why=type(error).__name__, engine=label, reason=reason, cause=cause)
-    if label not in [row.engine for row in result.rows]:
-        result.not_asked.append(label)
+def add_answer(result: EnginesResult, setup: Setup, record: EngineRecord) -> None:
+    """The row of an engine, and its sentence."""
+    answer, label = result.answers[record.label], record.label
+    cells = {cell: say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")}
+    reads, equations, runs = cells.values()
+    row = AnswerRow(engine=label, precision=record.precision, reads_the_file=reads, equations=equations, as_it_runs=runs)
+    result.tables["engines_answer"].append(row)
+    result.top.append(result.finding("engine", row=row))
+    setup.progress(say(result.top[-1]))
 
 
 def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None:
-    setup.progress(f"engines: {engine.record.label}{' compiles' * engine.record.compiles}")
+    """All that is asked of an engine, until it does not answer."""
+    record, label, nv = engine.record, engine.record.label, setup.robot.coordinates.nv
+    answer, (fixed, by_speed, by_pair) = result.answers[label], COMPILATION
+    seconds = fixed + by_speed * nv + by_pair * nv**2
+    setup.progress(say(result.finding("asks", engine=label, seconds=seconds if record.compiles else None, speeds=nv)))
     dynamics = engine.of(setup.robot.case())
-    reading = dynamics.reading
-    compare_numbers(result, setup.robot, engine.record, reading)
-    reads_another = bool(reading["mended"] or reading["lacking"]) and reading["way"] != FROM_URDF
-    as_read = engine.as_read(setup.robot.case()) if reads_another else None
-    compare_quantities(result, setup, engine.record, dynamics, as_read)
-    free = names_of_free(setup.robot)
-    are_right = all(row.passed for row in result.rows if row.engine == engine.record.label)
-    if free and reading["way"] == FROM_FILE and "armature" not in reading["mended"] and not are_right:
-        result.find("armature_of_free", engine=engine.record.label, joints=free)
-    if all(reading["mended"].values()):
-        servos.follow_step(result, setup, engine, reads_another)  # soon compiled
-        integrators.compare_methods(result, setup, engine)
-        batches.time_batches(result, setup, engine)
-
-
-def names_of_free(robot: Robot) -> list[str]:
-    """The free joints that have armature."""
-    armature, joints = np.array(robot.tree.armature), robot.coordinates.places.joints
-    firsts = [first for first in free_joints(robot.tree) if armature[joints[first].qd.start :][:6].any()]
-    return [robot.joints[first].removesuffix(" x") for first in firsts]
+    try:
+        compare_numbers(result, setup.robot, record, dynamics.file, dynamics.reading)
+        compare_quantities(result, setup, record, dynamics)
+        add_runs(result, setup, record, dynamics)
+    except NOT_ASKED as error:
+        kind, reason = type(error).__name__, str(error).rstrip(".")
+        cause = feature_of_speeds(dynamics.file, error.speeds) if isinstance(error, OtherJoints) else None
+        answer["why_not"] = {"kind": kind, "reason": reason}
+        result.tables["engines_read"].append(ReadRow(label, cause=cause, why_not=str(error)))
+        result.find("not_asked", why=kind, engine=label, reason=reason, cause=cause)
+    except TooLong as error:
+        answer.setdefault("why_not", {"kind": "TooLong", "reason": str(error)})
+        result.find("not_asked", why="TooLong", engine=label, reason=str(error), cause=None)
+    except EngineError as error:
+        answer["why_not"] = {"kind": "EngineError", "reason": str(error)}
+        result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
 
 
 def compare_quantities(
-    result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics,
-    as_read: OutsideDynamics | None = None,
-) -> None:  # fmt: skip
-    """Rows and checks of M, h and accelerations at the states that have exact values. as_read: None: as the others."""
+    result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics
+) -> None:
+    """Rows and checks of M, h and accelerations at the states that have exact values, with the numbers that can be set."""
     sample, mujoco = asked_at(setup, record.precision), setup.engines["mujoco"].of(setup.robot.case())
+    made = []
     for name in COMPARED:
-        function = QUANTITIES[name].function
-        if not dynamics.has(function):
-            result.find("no_function", engine=record.label, quantity=name)
-            continue
-        states = QUANTITIES[name].states(sample)
-        values = {"set": getattr(dynamics, function)(*states), "mujoco": getattr(mujoco, function)(*states)}
-        try:
-            values["read"] = getattr(as_read, function)(*states) if as_read else values["set"]
-        except EngineError as error:  # with what it has read it may have no solution
-            what = f"{name} of {record.label}, as read"
-            result.find("left_out", what=what, reason=str(error).rstrip("."))
-            values["read"] = np.full_like(values["set"], np.inf)
-        compare_quantity(result, sample, record, name, values)
+        quantity = QUANTITIES[name]
+        states = quantity.states(sample)
+        values, of_mujoco = (getattr(of, quantity.function)(*states) for of in (dynamics, mujoco))
+        made.append(compare_quantity(result, sample, record, name, values, of_mujoco))
+    differ = [row.worst_entry for row in made if not row.passed]
+    eps = max(row.difference_eps for row in made)
+    result.answers[record.label]["equations"] = {"differ": differ, "eps": eps}
 
 
 def compare_quantity(
-    result: Result, sample: Sample, record: EngineRecord, name: str, values: dict[str, np.ndarray]
-) -> None:
-    """A check of the entry that is closest to its tolerance, and a row. values: with the numbers set, as read, MuJoCo's."""
+    result: Result, sample: Sample, record: EngineRecord, name: str, values: np.ndarray, of_mujoco: np.ndarray
+) -> EngineRow:
+    """A check of the entry that is closest to its tolerance, and a row."""
     quantity, scale, eps = QUANTITIES[name], Entries(sample.tree, sample.q, sample.qd), record.eps
     exact = quantity.exact(sample)
-    size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values["set"].shape)
-    distances, tolerance = (
-        {which: exact.distance(array) for which, array in values.items()},
-        FACTOR * eps * size,
-    )
-    worst = closest(distances["set"], tolerance)
-    numbers = {name: [repr(float(x)) for x in getattr(sample, name)[worst[0]]] for name in ("q", "qd", "tau")}
+    size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values.shape)
+    distance, tolerance = exact.distance(values), FACTOR * eps * size
+    state, *entry = worst = closest(distance, tolerance)
+    numbers = {name: [repr(float(x)) for x in getattr(sample, name)[state]] for name in ("q", "qd", "tau")}
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
-    unit, pair = quantity.unit(sample.tree), (distances["set"][worst], tolerance[worst])
-    check = result.check(record.label, f"{name} to exact", *pair, unit, note, True, about=About.ENGINE)
+    unit = quantity.unit(sample.tree)
+    check = result.check(
+        record.label, f"{name} to exact", distance[worst], tolerance[worst], unit, note, True, about=About.ENGINE
+    )
+    names = Coordinates(sample.tree.joint_names, sample.tree.kind).speeds
     result.rows.append(EngineRow(
         engine=record.label, precision=record.precision, quantity=name, unit=unit, states=len(sample.q),
-        as_read_over_bar=float(over(distances["read"], tolerance).max()), worst_difference=check.value,
-        bar=check.tolerance, difference_over_bar=check.over_tolerance,
-        difference_eps=float(over(distances["set"], eps * size).max()),
-        mujoco_eps=float(over(distances["mujoco"], EPS * size).max()), passed=check.passed,
+        worst_difference=check.value, bar=check.tolerance, difference_over_bar=check.over_tolerance,
+        difference_eps=float(over(distance, eps * size).max()),
+        mujoco_eps=float(over(exact.distance(of_mujoco), EPS * size).max()),
+        worst_entry=f"{name}[{', '.join(names[k] for k in entry)}]", passed=check.passed,
     ))  # fmt: skip
+    return result.rows[-1]
 
 
 def asked_at(setup: Setup, precision: str) -> Sample:
@@ -179,12 +161,31 @@ def asked_at(setup: Setup, precision: str) -> Sample:
     return Sample(setup.robot.tree, sample.name, q, qd, tau, sample.exact_states)
 
 
-def figures(result: EnginesResult, robot: Robot) -> Iterator[partial[Any]]:
-    from . import figures_engines as drawn  # matplotlib is for the process that draws
-
-    has_errors = any(row.worst_error for row in result.tables["engines_methods"])
-    drawings = {
-        drawn.draw_errors: has_errors,
-        drawn.draw_servos: result.tables["engines_servos"], drawn.draw_batches: result.tables["engines_batches"],
-    }  # fmt: skip
-    yield from (partial(draw, result) for draw, is_drawn in drawings.items() if is_drawn)
+def add_runs(result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics) -> None:
+    """Rows and a check of the file as it runs in an engine that steps MuJoCo's model."""
+    answer, unit = result.answers[record.label], movement_unit(setup.robot.coordinates)
+    try:
+        runs = dynamics.ask(answers.runs_as_it_is)
+    except TooLong:
+        raise
+    except EngineError as error:
+        answer["runs"] = {"why_not": str(error).rstrip(".")}
+        result.find("not_run", engine=record.label, reason=str(error).rstrip("."))
+        return
+    if not runs:
+        return
+    answer["runs"] = {"runs": runs, "unit": unit}
+    for run in runs:
+        first = run.first and {f"first_{name}": value for name, value in run.first._asdict().items()}
+        apart = {f"apart_{steps}": run.apart.get(steps) for steps in (1, 10, 100)}
+        result.tables["engines_runs"].append(RunRow(
+            engine=record.label, iterations=run.iterations, ls_iterations=run.ls_iterations, own_settings=run is runs[0],
+            unit=unit, **apart, **(first or {}),
+        ))  # fmt: skip
+    # what a solver has not converged to is not the engine's error
+    last, note = runs[-1], ""
+    if last.first:
+        note = f"{last.first.field}[{last.first.of}] at step {last.first.step}"
+    what = f"a step from MuJoCo's own states, over its tolerance, {last.iterations} iterations"
+    result.check(record.label, what, last.over, 1.0, "", note, True, about=About.ENGINE)
+    result.find("runs", engine=record.label, runs=runs, unit=unit)

@@ -1,117 +1,82 @@
 """What each engine has read: the numbers that differ from the compiled model, body by body and joint by joint, and why."""
 
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 
 import numpy as np
 
 from ...core.check import About
 from ...core.words import some_of
 from ...engines import EngineRecord
-from ...engines.outside.bodies import size_of
-from ...engines.outside.file import File, OtherJoints
-from ...engines.outside.mjcf_text import REFUSED
+from ...engines.mujoco.source import Source
+from ...engines.outside.bodies import OF_BODIES, OF_JOINTS, size_of
+from ...engines.outside.file import File
 from ...engines.outside.model import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from .causes import FLOAT32, Cause, Entry, causes_of
-from .tables import EnginesResult, ReadRow, Share
+from .features import Entry, causes_of
+from .tables import EnginesResult, ReadRow
 
-UNITS = {"gravity": "m/s2", "mass": "kg", "moments": "kg m2", "com": "m", "inertia": "kg m2", "axis": "", "anchor": "m",
-         "armature": "kg m2", "damping": "N m s/rad", "stiffness": "N m/rad"}  # fmt: skip
-OF_BODIES = "mass", "moments"  # no convention makes these differ
-ENTRIES = {"mass": 1, "moments": 3, "com": 3, "inertia": 9, "axis": 3, "anchor": 3}  # of a joint
-OF_JOINTS = "axis", "anchor"
+UNITS = {"gravity": "m/s2", "mass": "kg", "com": "m", "com_moved": "m", "inertia": "kg m2", "axis": "", "anchor": "m"}
+OF_SPEEDS = {"armature": {"rad": "kg m2", "m": "kg"}, "damping": {"rad": "N m s/rad", "m": "N s/m"},
+             "stiffness": {"rad": "N m/rad", "m": "N/m"}}  # fmt: skip
+CHECKED = "mass", "inertia"  # no convention makes these differ
+ENTRIES = {"mass": 1, "inertia": 9, "com": 3, "com_moved": 3, "axis": 3, "anchor": 3}  # of a joint
 # not listed where one of these differs too
-FOLLOWS = {
-    "inertia": ("moments", "mass"), "com": ("mass",), "axis_moved": ("axis",), "anchor_moved": ("anchor", "axis"),
-    "com_moved": ("com", "axis", "anchor", "mass"),
-}  # fmt: skip
-# in place of a number, by the kind of error for which a copy was read: the file itself, or its joints
-OF_COPIES = {REFUSED: ["refused"], OtherJoints.__name__: ["joints"]}
-AS_READ = "as read"  # checks of numbers
+FOLLOWS = {"inertia": ("mass",), "com": ("mass",), "com_moved": ("com", "axis", "anchor", "mass")}
+SINGLE = float(np.finfo(np.float32).eps)
+ROUNDING = "digits beyond single precision, in which MuJoCo keeps the vertices of meshes"
 
 
-def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading) -> None:
-    """Rows of what an engine has read differently, and checks of the masses and moments of inertia."""
-    label, lacking, mended = record.label, list(reading["lacking"]), reading["mended"]
-    share = result.readers[label] = Share(reading["way"], reading["unwritten"])
-    if reading["copied"]:
-        kind, message = reading["copied"]
-        result.find("copied", engine=label, error=kind, reason=message.rstrip("."))
-        share.differing += OF_COPIES.get(kind, [])
-    if lacking:
-        result.find("lacking", engine=label, numbers=lacking)
-        share.differing += [f"no {number}" for number in lacking]
-    for number in [number for number in OF_BODIES if number in reading["read"]]:
-        most = np.abs(reading["read"][number] - reading["stated"][number]).max(initial=0.0)
-        pair = float(most), tolerance_of(reading, record, number)
-        result.check(label, f"{number} {AS_READ}", *pair, UNITS[number], "", True, about=About.ENGINE)
-    listed = [number for number in mended if number not in lacking]
-    listed = [number for number in listed if not set(FOLLOWS.get(number, ())) & mended.keys()]
-    entries = [entry for number in listed for entry in differing(robot, record, reading, number)]
-    causes = causes_of(record, file_of(robot), reading, entries)
-    for number in listed:
-        of_number = {entry: causes.get(entry) for entry in entries if entry.number == number}
-        add_differing(result, robot, record, reading, of_number)
-    numbers: dict[Cause | None, list[str]] = {}
+def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, file: File, reading: Reading) -> None:
+    """Rows of what an engine has read differently, and checks of the masses and inertias."""
+    label, rows = record.label, [ReadRow(record.label, number, "joints", why_not=None) for number in reading.lacking]
+    for number in [number for number in CHECKED if number in reading.read]:
+        largest = np.abs(reading.read[number] - reading.stated[number]).max(initial=0.0)
+        bar = FACTOR * record.eps * size_of(reading.stated, number)
+        result.check(label, f"{number} as read", largest, bar, UNITS[number], "", True, about=About.ENGINE)
+    listed = [number for number in reading.differing if not {*FOLLOWS.get(number, ())} & {*reading.differing}]
+    entries = [entry for number in listed for entry in differing(record, reading, number)]
+    causes = causes_of(record, file, reading, entries) if entries else {}
+    is_meshed = bool(entries) and any(any(meshes) for _, meshes in Source(file.path, file.floating).mesh_geoms)
     for entry in entries:
-        numbers.setdefault(causes.get(entry), []).append(entry.number.removesuffix("_moved"))
-    for cause, of_cause in numbers.items():
-        result.find("cause", engine=label, cause=cause, numbers=list(dict.fromkeys(of_cause)))
-
-
-def tolerance_of(reading: Reading, record: EngineRecord, number: str) -> float:
-    return FACTOR * record.eps * size_of(reading["stated"], number)
-
-
-def file_of(robot: Robot) -> File:
-    return File(Path(robot.mjcf), robot.joints, robot.coordinates.all_kinds)
-
-
-def differing(robot: Robot, record: EngineRecord, reading: Reading, number: str) -> list[Entry]:
-    """The entries of a number that an engine has read differently."""
-    values, stated = (np.ravel(reading[which][number]) for which in ("read", "stated"))
-    _, joints = named_after(robot, number.removesuffix("_moved"))
-    is_right = np.abs(values - stated) <= tolerance_of(reading, record, number)
-    bodies = [tuple(names) for names in bodies_of(robot)]
-    places = np.flatnonzero(~is_right).tolist()
-    return [Entry(number, place, joints[place], bodies[joints[place]]) for place in places]
-
-
-def add_differing(
-    result: EnginesResult, robot: Robot, record: EngineRecord, reading: Reading, causes: Mapping[Entry, Cause | None]
-) -> None:  # fmt: skip
-    """Rows and a finding of a number that an engine has read differently; causes: of its entries."""
-    number = next(iter(causes)).number
-    quantity, label, is_set = number.removesuffix("_moved"), record.label, reading["mended"][number]
-    values, stated = (np.ravel(reading[which][number]) for which in ("read", "stated"))
-    names, rows = named_after(robot, quantity)[0], []
-    for entry, cause in causes.items():
-        pair = float(values[entry.place]), float(stated[entry.place])
-        text = cause and str(cause)
-        rows.append(ReadRow(label, number, names[entry.place], *pair, UNITS[quantity], is_set, text))
+        number, place = entry
+        values, stated = (float(np.ravel(which[number])[place]) for which in (reading.read, reading.stated))
+        is_rounding = abs(values - stated) <= FACTOR * SINGLE * size_of(reading.stated, number)
+        cause = causes.get(entry, ROUNDING if is_meshed and is_rounding and number in OF_BODIES else None)
+        of, unit = owner(robot, number, place)
+        rows.append(ReadRow(label, number, of, values, stated, unit, number not in reading.not_set, cause))
     result.tables["engines_read"] += rows
-    count = len({entry.joint for entry in causes})
-    result.find("read_differently", engine=label, rows=rows, number=number, mended=is_set, count=count)
-    listed = result.readers[label].differing
-    is_rounding = {cause.kind if cause else "" for cause in causes.values()} == {FLOAT32}
-    word = "rounding of meshes" if is_rounding else quantity
-    listed += [] if word in listed else [word]
+    count = sum(reading.read[name].size for name in reading.read)
+    answer = {"numbers": count, "rows": rows, "not_set": reading.not_set, "lacking": reading.lacking}
+    result.answers[label] = {"reads": answer}
+    for cause in dict.fromkeys(row.cause for row in rows if row.compared is not None):
+        of_cause = [row for row in rows if row.cause == cause and row.compared is not None]
+        result.find("read_differently", engine=label, rows=of_cause, cause=cause)
+    if reading.lacking:
+        result.find("lacking", engine=label, numbers=reading.lacking)
 
 
-def named_after(robot: Robot, number: str) -> tuple[list[str], list[int]]:
-    """What each entry of a number belongs to, a body, a joint or an axis, and the joint of the Tree in whose row it is."""
+def differing(record: EngineRecord, reading: Reading, number: str) -> list[Entry]:
+    """The entries of a number that an engine has read differently; of a symmetric inertia the upper triangle."""
+    values, stated = (np.array(which[number], float) for which in (reading.read, reading.stated))
+    is_wrong = ~(np.abs(values - stated) <= FACTOR * record.eps * size_of(reading.stated, number))
+    if number == "inertia":
+        is_wrong = np.triu(is_wrong)
+    return [Entry(number, place) for place in np.flatnonzero(is_wrong).tolist()]
+
+
+def owner(robot: Robot, number: str, place: int) -> tuple[str, str]:
+    """What an entry of a number belongs to, a body, a joint or an axis of the world; and its unit."""
     if number == "gravity":
-        return list("xyz"), [0, 0, 0]
-    places = robot.coordinates.places.joints
+        return "xyz"[place], UNITS[number]
+    if number in OF_JOINTS:
+        coordinates = robot.coordinates
+        return coordinates.speeds[place], OF_SPEEDS[number][coordinates.units[place]]
     if number not in ENTRIES:
-        joints = [k for k, joint in enumerate(places) for _ in range(joint.qd.stop - joint.qd.start)]
-        return list(robot.coordinates.speeds), joints
-    of_bodies = [some_of(names) or joint for names, joint in zip(bodies_of(robot), robot.joints)]
-    names = list(robot.joints) if number in OF_JOINTS else of_bodies
-    joints = np.repeat(np.arange(len(names)), ENTRIES[number]).tolist()
-    return [names[joint] for joint in joints], joints
+        return f"entry {place}", ""  # of a field of MuJoCo's own model
+    joint = place // ENTRIES[number]
+    name = robot.joints[joint] if number in ("axis", "anchor") else some_of(bodies_of(robot)[joint])
+    return name or robot.joints[joint], UNITS[number]
 
 
 def bodies_of(robot: Robot) -> Sequence[Sequence[str]]:

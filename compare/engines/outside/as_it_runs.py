@@ -1,0 +1,176 @@
+"""The file as it runs, with contacts, friction, actuators and the solver's own settings, beside MuJoCo.
+
+In the engine's own process. Free runs say how far apart the positions are after some of the file's own steps. Steps from
+MuJoCo's own states, one at a time, say which field differs first: a free run would blame chaos on one.
+"""
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from ...judge.scale import EPS, FACTOR
+from .. import Array
+from ..mujoco.names import bit, element_name, joint_places
+from ..mujoco.source import Source
+from .file import File
+
+STEPS, LISTED = 100, (1, 10, 100)  # of the file's own; those after which free runs are compared
+# largest difference of a field over its largest entry that is that of the precision
+BEYOND = {"float32": 1e-4, "float64": FACTOR * EPS}
+# that are tried where a field differs: what a solver has not converged to is not the engine's error
+ITERATIONS, LS_ITERATIONS = (2, 4, 100), 50
+SLOW = 20.0  # s, of a run with its compilation, after which only the most iterations are tried
+# an acceleration solves M, and the solver stops at its own tolerance
+SOLVED = "qacc_smooth", "efc_force", "qfrc_constraint", "qacc", "qvel after", "qpos after"
+
+
+PASSING = 1e-2
+FIELDS = (
+    "xpos", "M", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "contacts", "dist", "efc_J", "efc_aref", "qacc_smooth",
+    "efc_force", "qfrc_constraint", "qacc", "qvel after", "qpos after",
+)  # fmt: skip
+
+
+class Difference(NamedTuple):
+    """A field of a step from MuJoCo's own state that an engine has otherwise."""
+
+    step: int  # from 1
+    field: str
+    of: str  # a degree of freedom or a body; a pair of geoms
+    share: float  # of the largest entry of the field
+
+
+class Run(NamedTuple):
+    """A file beside MuJoCo; iterations, ls_iterations: of the solver."""
+
+    iterations: int
+    ls_iterations: int
+    apart: dict[int, float]  # rad or m, the largest of q, by the number of steps of free runs
+    first: Difference | None
+    largest: dict[str, float]  # share of each field over all steps
+    over: float  # the largest share over what its field is allowed
+    seconds: float  # with compilation
+
+
+class Stepper(ABC):
+    """MuJoCo's model in an engine that steps it: its own if it reads the file itself."""
+
+    @abstractmethod
+    def __init__(self, file: File, model: mujoco.MjModel):
+        """Put the model; NotImplementedError or ValueError where the engine has not all that it needs."""
+
+    @abstractmethod
+    def put(self, data: mujoco.MjData) -> Any:
+        """The engine's data with the state, controls and warm start of MuJoCo's."""
+
+    @abstractmethod
+    def step(self, data: Any) -> Any:
+        """The engine's data after a step."""
+
+    @abstractmethod
+    def get(self, data: Any) -> mujoco.MjData:
+        """Data of the engine's in MuJoCo's."""
+
+
+def runs(kind: Callable[[File, Any], Stepper], precision: str, file: File) -> list[Run]:
+    """The file's own run, and where it differs those with more iterations, until one does not."""
+    source = Source(file.path, file.floating)
+    model, beyond = mujoco.MjModel.__copy__(source.model), BEYOND[precision]
+    model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    own = int(model.opt.iterations)
+    made = [one_run(kind, file, model, beyond)]
+    more = [count for count in ITERATIONS if count > own]
+    for count in more if made[0].seconds < SLOW else more[-1:]:
+        if made[-1].first is None:
+            break
+        model.opt.iterations, model.opt.ls_iterations = count, max(LS_ITERATIONS, source.model.opt.ls_iterations)
+        made.append(one_run(kind, file, model, beyond))
+    return made
+
+
+def one_run(
+    kind: Callable[[File, Any], Stepper], file: File, model: mujoco.MjModel, beyond: float, steps: int = STEPS
+) -> Run:
+    """Steps from the first keyframe with its controls, else from qpos0."""
+    begin, engine, data = time.perf_counter(), kind(file, model), mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_forward(model, data)  # for the warm start
+    free, apart = engine.put(data), dict[int, float]()
+    pairs = list[tuple[dict[str, Array], dict[str, Array]]]()
+    for step in range(1, steps + 1):
+        other = engine.get(engine.step(engine.put(data)))
+        free = engine.step(free)
+        mujoco.mj_step(model, data)
+        if not np.isfinite(data.qacc).all():
+            break
+        pairs.append((fields(model, data), fields(model, other)))
+        if step in LISTED:
+            apart[step] = float(np.abs(data.qpos - engine.get(free).qpos).max())
+    of_fields = compared(model, pairs, beyond)
+    seconds = time.perf_counter() - begin
+    return Run(int(model.opt.iterations), int(model.opt.ls_iterations), apart, *of_fields, seconds)
+
+
+def compared(
+    model: mujoco.MjModel, pairs: Sequence[tuple[dict[str, Array], dict[str, Array]]], beyond: float
+) -> tuple[Difference | None, dict[str, float], float]:
+    """first, largest and over of a Run. pairs: fields of MuJoCo and of the engine."""
+    names, over, first, largest = names_of(model), 0.0, None, dict[str, float]()
+    peaks = {name: max(size(mine[name]) for mine, _ in pairs) for name in FIELDS if pairs}
+    for step, (mine, others) in enumerate(pairs, 1):
+        for name in FIELDS:
+            bar = max(beyond, model.opt.tolerance) if name in SOLVED else beyond
+            share, worst = 1.0, 0
+            if mine[name].shape == others[name].shape:
+                # what is small beside what the field has at other steps is rounding
+                scale = max(size(mine[name]), PASSING * peaks[name]) or 1.0
+                shares = np.nan_to_num(np.abs(mine[name] - others[name]) / scale, nan=np.inf).ravel()
+                worst = int(shares.argmax()) if shares.size else 0
+                share = float(shares.max(initial=0.0))
+            largest[name], over = max(largest.get(name, 0.0), share), max(over, share / bar)
+            if first is None and share > bar:
+                owners = names.get(name, [""])
+                first = Difference(step, name, owners[worst * len(owners) // max(mine[name].size, 1)], share)
+    return first, largest, over
+
+
+def size(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))
+
+
+def fields(m: mujoco.MjModel, d: mujoco.MjData) -> dict[str, Array]:
+    """The fields of a step in the order of the pipeline, whatever the order of contacts and of the constraints' rows.
+
+    J of the rows is joined to J'J, (nv, nv), aref to J'aref, force to |J|'|force|, (nv,).
+    """
+    M, rows = np.zeros((m.nv, m.nv)), d.efc_J.reshape(-1, m.nv)[: d.nefc]
+    mujoco.mj_fullM(m, d, M)
+    contacts, force = sorted(contacts_of(d)), np.abs(rows).T @ np.abs(d.efc_force[: d.nefc])
+    pairs, distances = [pair for pair, _ in contacts], [distance for _, distance in contacts]
+    constraints = rows.T @ rows, rows.T @ d.efc_aref[: d.nefc], d.qacc_smooth, force, d.qfrc_constraint
+    smooth = d.xpos, M, d.qfrc_bias, d.qfrc_passive, d.qfrc_actuator, pairs, distances
+    return {name: np.array(value, float) for name, value in zip(FIELDS, (*smooth, *constraints, d.qacc, d.qvel, d.qpos))}
+
+
+def contacts_of(d: mujoco.MjData) -> Iterator[tuple[tuple[int, int], float]]:
+    """The contacts that act: the sorted pair of geoms, and the distance, m."""
+    for contact in d.contact:
+        if contact.dist < contact.includemargin:
+            first, second = sorted(map(int, contact.geom))
+            yield (first, second), float(contact.dist)
+
+
+def names_of(m: mujoco.MjModel) -> dict[str, list[str]]:
+    """What the entries of a field belong to, by its name."""
+    speeds = [""] * m.nv
+    for name, place in joint_places(m).items():
+        for dof in place.dofs:
+            speeds[dof] = name
+    of_speeds = "M", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "efc_J", "efc_aref", *SOLVED[:-1]
+    return dict.fromkeys(of_speeds, speeds) | {"xpos": [element_name(m, "body", b) for b in range(m.nbody)]}
