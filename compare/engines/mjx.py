@@ -49,7 +49,9 @@ class Model(OfCompiled):
 
     def values(self, at: State, force: Array) -> tuple[Array, ...]:
         """M, h and the acceleration, without damping and stiffness, which are part of the force."""
-        model = self.first.replace(**{name: 0.0 * getattr(self.first, name) for name in STIFFNESS_AND_DAMPING})
+        model = self.first.replace(
+            **{name: 0.0 * getattr(self.first, name) for name in STIFFNESS_AND_DAMPING}
+        )
         state = (values.astype(self.precision) for values in (at.x, at.u, force))
         return tuple(map(np.asarray, functions()["values"](model, self.data, *state)))
 

@@ -111,7 +111,13 @@ class Model(SteppedModel):
         self.set_state(at)
         arrays = self.state.body_q, self.model.body_mass, self.model.body_com, self.model.body_inertia
         numbers, links = [array.numpy().astype(float) for array in arrays], []
-        of_joints = self.model.joint_type.numpy(), self.model.joint_parent.numpy(), self.children, self.firsts, self.firsts[1:]
+        of_joints = (
+            self.model.joint_type.numpy(),
+            self.model.joint_parent.numpy(),
+            self.children,
+            self.firsts,
+            self.firsts[1:],
+        )
         for kind, parent, child, first, end in zip(*of_joints):
             x, *body = (array[child] for array in numbers)
             # of several joints the last moves the body

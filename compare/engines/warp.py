@@ -83,7 +83,9 @@ class Model(OfCompiled):
     def mass_matrix(self, at: State) -> Array:
         M, model = np.zeros((at.u.size, at.u.size)), self.undamped
         row, column = np.repeat(np.arange(at.u.size), model.M_rownnz.numpy()), model.M_colind.numpy()
-        M[row, column] = M[column, row] = self.forward(at, 0.0 * at.u).M.numpy()[0]  # the lower triangle, row by row
+        M[row, column] = M[column, row] = self.forward(at, 0.0 * at.u).M.numpy()[
+            0
+        ]  # the lower triangle, row by row
         return M
 
     def bias(self, at: State) -> Array:

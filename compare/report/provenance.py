@@ -17,7 +17,7 @@ from ..process.workers import Clock
 OURS = "arm-tmt-mujoco"
 PACKAGES = ["mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka"]
 # if installed
-OF_ENGINES = ["drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton", "dartpy", "pybullet"]
+OF_ENGINES = ["drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton"]
 # changes elsewhere do not change the program
 PROGRAM_FILES = [":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml"]
 

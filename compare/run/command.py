@@ -77,6 +77,7 @@ def compute(
 
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
         of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+        of_run["tell"] = terminal.say
         of_run |= {"alone": is_alone, "request": request, "command": command}
         setup = examine.setup_of(compared, options.quick, options.engines, **of_run)
         for name, reason in reasons.items():

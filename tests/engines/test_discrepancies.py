@@ -14,8 +14,13 @@ from compare.engines.outside import Outside
 TEXT = Path(__file__).parents[2] / "reports/engines/discrepancies.md"
 BLOCK = re.compile(r"^## (.*?)$(?:(?!^## ).)*?^```python\n(.*?)^```\n\n```text\n(.*?)^```$", re.M | re.S)
 BLOCKS = BLOCK.findall(TEXT.read_text())
-PACKAGES = {"pydrake": "drake", "mujoco_warp": "warp", "newton": "newton", "pinocchio": "pinocchio", "pybullet": "pybullet",
-            "mjx": "mjx"}  # fmt: skip
+PACKAGES = {
+    "pydrake": "drake",
+    "mujoco_warp": "warp",
+    "newton": "newton",
+    "pinocchio": "pinocchio",
+    "mjx": "mjx",
+}
 # what engines themselves print is left out
 RUN = """import functools, sys
 with open(sys.argv[2], "w") as out:

@@ -1,4 +1,4 @@
-"""Other engines: what is found in what one has read, in its equations and in its integrators; one that errs fails, and alone."""
+"""Other engines: what is found in what one has read, in its equations and in its runs; one that errs fails, and alone."""
 
 import csv
 import dataclasses
@@ -11,23 +11,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from edited import setup_of, setup_of_file
+from edited import setup_of
 from trees import tree_of_kinds
 
-from compare import engines
-from compare.core.check import About, Result
+from compare import engines, experiments
+from compare.core.check import About
+from compare.core.errors import Refused
+from compare.core.text import say
 from compare.engines import EngineRecord
-from compare.engines.outside import OutsideDynamics
+from compare.engines.outside import Outside
+from compare.engines.outside.as_it_runs import Difference, Run
 from compare.engines.outside.bodies import Body, combined, links_of, numbers_of, size_of
-from compare.engines.outside.file import File
-from compare.engines.outside.model import FROM_FILE, ReadModel
+from compare.engines.outside.file import EngineError, File
+from compare.engines.outside.model import Reading, ReadModel
 from compare.engines.outside.order import Order
 from compare.engines.tmt import TmtDynamics
-from compare.experiments.engines import EnginesResult, compare_numbers, compare_quantities, integrators
-from compare.experiments.engines.motion import free_scene
+from compare.experiments.engines import EnginesResult, add_runs, compare_numbers, compare_quantities, is_same
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.arm import ARM
+from compare.run.examine import not_chosen
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = [name for name, record in engines.RECORDS.items() if record.reads_file]
@@ -39,17 +42,15 @@ AGAIN = '''"""tmt in a process of its own, which reads the file by MuJoCo."""
 
 import dataclasses
 
-import numpy as np
-
 import tmt
 
 from . import EngineRecord
-from .outside.bodies import numbers_of
+from .outside.bodies import OF_JOINTS, links_of, numbers_of
 from .outside.model import ReadModel
 from .outside.order import Order
 
 ENGINE = EngineRecord(order=90, label="{label}", reads_file=True, precision="{precision}")
-METHODS = {{"rk4": (4, "rk4"), "Euler": (1, "semi_implicit_euler"), "free": (None, "own")}}
+METHODS = {{}}
 
 
 class Model(ReadModel):
@@ -59,15 +60,15 @@ class Model(ReadModel):
         self.file, tree = file, read(file.path).tree
         self.order = Order(file, {{0: (0, 0), 1: (1, 1)}})
         self.tree = dataclasses.replace(tree, {wrong})
+        self.used = {{name: numbers_of(self.tree)[name] for name in OF_JOINTS if name != "{untold}"}}
 
-    def fields(self):
-        told = numbers_of(self.tree)
-        return {{name: told[name] for name in told if name not in ("about_origin", "{untold}")}}
+    def links(self, at):
+        return links_of(self.tree, at.x)
 
-    def set_field(self, name, values):
+    def set(self, name, values):
         if name == "gravity":
+            self.used["gravity"] = values
             self.tree = dataclasses.replace(self.tree, gravity=values)
-        return name == "gravity"
 
     def mass_matrix(self, at):
         return tmt.mass_matrix(at.x, self.tree)
@@ -77,22 +78,15 @@ class Model(ReadModel):
 
     def acceleration(self, at, force):
         return tmt.acceleration(at.x, at.u, force, dataclasses.replace(self.tree, damping=[0.0] * len(force)))
-
-    def run(self, course):
-        q, v, tau, times, steps, method, tolerance, _ = course
-        method = {{"Euler": "{euler}", "free": "dopri8_adaptive"}}.get(method, method)
-        steps = steps or len(times) - 1
-        m = tmt.simulate(q, v, tau, times[-1] / steps, steps, method, self.tree, tolerance)
-        return np.hstack([m.q, m.qd])[:: steps // (len(times) - 1)], m.evaluations
 '''
 NAMES = {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}
-RIGHT = {"label": "Right", "precision": "float64", "wrong": "", "untold": "", "euler": "semi_implicit_euler"}
+RIGHT = {"label": "Right", "precision": "float64", "wrong": "", "untold": ""}
 ENGINES = {
     "again": {}, "heavy": {"label": "Heavy", "wrong": "mass=[1.0, 1.001]"},
     "tilted": {"label": "Tilted", "wrong": "axis=[(0.0, 1.0, 0.0), (1.0, 1e-6, 0.0)]"},
     "upside": {"label": "Upside", "wrong": "gravity=(0.0, 0.0, 9.81)"},
     "bare": {"label": "Bare", "wrong": "armature=[0.0, 0.0]", "untold": "armature"},
-    "later": {"label": "Later", "euler": "explicit_euler"}, "blind": {"label": "Blind", "wrong": "**{}[0]"},
+    "blind": {"label": "Blind", "wrong": "**{}[0]"},
     "slow": {"label": "Slow", "wrong": "mass=__import__('time').sleep(60.0)"},
 }  # fmt: skip
 ASKED = """import numpy as np
@@ -104,7 +98,7 @@ if __name__ == "__main__":  # processes of engines begin with this file
     dies, other = (outside.Outside(name).of(case) for name in ("mortal", "again"))
     readings = set()  # by the seconds that they took
     for _ in range(2):
-        readings.add(other.ask(outside.attrgetter("reading"))["seconds"])
+        readings.add(other.ask(outside.answers.reading).seconds)
         print(dies.bias(q, q).shape, other.mass_matrix(q).shape, len(readings))
         try:
             dies.mass_matrix(q)
@@ -151,7 +145,6 @@ def test_each_seeded_error_fails_its_own_checks_and_no_others(report):
     assert {"Mbar to exact", "bias to exact", "qdd to exact"} <= failed["Tilted"]
     assert "mass as read" not in failed["Tilted"]
     assert {"Mbar to exact", "qdd to exact"} <= failed["Bare"] and "bias to exact" not in failed["Bare"]
-    assert failed["Later"] == {"one step of Euler, compared with tmt's semi_implicit_euler"}
 
 
 def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
@@ -166,35 +159,45 @@ def test_what_is_read_differently_is_a_row_and_says_whether_it_was_set(report):
     assert {engine for engine, *_ in rows} == {"Upside", "Heavy", "Blind", "Tilted", "Slow"}
 
 
-def test_two_verdicts_stand_side_by_side(report):
-    """As read, and as set: gravity can be set, mass and axis cannot; who takes no part is not counted among those who agree."""
+def test_each_engine_has_its_three_answers(report):
+    """Gravity can be set, mass and axis cannot; one that is not judged is not said to compute what MuJoCo does."""
     rows = {row["engine"]: row for row in table(report[0], "engines_answer")}
-    verdicts = {"Right": ("same", "same"), "Upside": ("gravity", "same"), "Heavy": ("mass", "not set")}
-    assert {label: (rows[label]["as_read"], rows[label]["as_set"]) for label in verdicts} == verdicts
-    assert rows["Later"]["as_set"] == "same" and "Blind" not in rows
-    shares = {(row["engine"], row["quantity"]): row for row in table(report[0], "engines")}
-    assert float(shares["Upside", "bias"]["as_read_over_bar"]) > 1e6
-    assert float(shares["Upside", "bias"]["difference_over_bar"]) < 1.0
-    assert rows["Right"]["within_1e_9"] and float(rows["Right"]["floor_rad"]) < 1e-9
+    assert rows["Right"]["reads_the_file"].startswith("the same ") and rows["Right"]["equations"].startswith(
+        "the same "
+    )
+    assert "gravity" in rows["Upside"]["reads_the_file"] and rows["Upside"]["equations"].startswith(
+        "the same "
+    )
+    assert "not set: mass" in rows["Heavy"]["reads_the_file"] and "Mbar" in rows["Heavy"]["equations"]
+    assert "no answer within 6 s" in rows["Slow"]["reads_the_file"]
+    lines = report[1].splitlines()
+    (first,) = [line for line in lines if line.startswith("robot.xml: ")]
+    same, other = first.split(" compute")[0], first.split(" do not")[0]
+    assert "Right" in same and not {"Heavy", "Upside", "Tilted", "Blind", "Slow"} & {
+        *same.replace(",", " ").split()
+    }
+    assert "Heavy" in other and "Blind and Slow: not judged" in first
+    assert {line.split()[0] for line in lines if line.startswith(" ") and "eps" in line} >= {
+        "Right",
+        "Upside",
+    }
 
 
-def test_orders_are_measured_and_what_does_not_answer_or_cannot_be_set_does_not_run(report):
-    assert "Slow: no answer within 6 s" in (report[0] / "report.md").read_text()
-    rows = table(report[0], "engines_methods")
-    assert {row["engine"] for row in rows} == {"Right", "Upside", "Bare", "Later", "MuJoCo", "TMT"}
-    errors = {row["dt_s"]: float(row["worst_error_rad"]) for row in rows
-              if row["engine"] == "Right" and row["method"] == "rk4"}  # fmt: skip
-    assert len(errors) > 2 and min(errors.values()) < max(errors.values()) / 100.0
-    said = " ".join(report[1].split())
-    assert "Upside, as read: gravity differs; as set: the same equations" in said
-    assert "Heavy, as read: mass differs; as set: it cannot all be set" in said
+def test_what_one_engine_has_found_is_told_before_the_next_one_is_asked(report):
+    """Slow comes last in the order of records, and says nothing for 6 s."""
+    assert report[1].index("Heavy reads") < report[1].index("robot.xml: ")
 
 
-def other(lacking="", **functions):
-    """tmt as another engine, without a function, or with others."""
+def other(**functions):
+    """tmt as another engine, with other functions."""
     dynamics = TmtDynamics(ARM.case())
-    vars(dynamics).update(functions, has=lambda quantity: quantity != lacking)
+    vars(dynamics).update(functions)
     return dynamics
+
+
+def empty(label="Other"):
+    tables = {f"engines_{name}": [] for name in ("answer", "read", "runs")}
+    return EnginesResult("engines", tables=tables, answers={label: {}})
 
 
 @pytest.mark.parametrize("precision", RECORDS)
@@ -202,7 +205,7 @@ def other(lacking="", **functions):
 @pytest.mark.parametrize("quantity, name", NAMES.items())
 def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, precision, share, fails):
     """A float32 engine is allowed what its own eps allows, and no more."""
-    record, right, result = RECORDS[precision], getattr(other(), quantity), Result("engines")
+    record, right, result = RECORDS[precision], getattr(other(), quantity), empty()
 
     def wrong(*state):
         values, scale = right(*state), Entries(ARM.tree, *state[:2])
@@ -214,31 +217,37 @@ def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, p
     compare_quantities(result, setup_of(), record, other(**{quantity: wrong}))
     assert [check.quantity for check in result.checks if not check.passed] == [f"{name} to exact"] * fails
     assert all(check.about is About.ENGINE for check in result.checks)
-    assert result.rows[0].as_read_over_bar == result.rows[0].difference_over_bar  # nothing is set
+    differ = result.answers["Other"]["equations"]["differ"]
+    assert len(differ) == fails and all(entry.startswith(f"{name}[") for entry in differ)
 
 
-def test_an_engine_without_a_function_is_not_judged_by_it():
-    result = Result("engines")
-    compare_quantities(result, setup_of(), RECORDS["float64"], other("bias"))
-    assert [check.quantity for check in result.checks] == ["Mbar to exact", "qdd to exact"]
-
-
-@pytest.mark.parametrize("number", ("mass", "moments", "gravity", "armature"))
+@pytest.mark.parametrize("number", ("mass", "inertia", "com", "axis", "gravity", "armature"))
 def test_a_number_as_read_just_inside_and_just_outside(number):
-    """Masses and moments are checked; a number that an engine drops or sets otherwise is a finding."""
+    """Masses and inertias are checked; another number is a row alone."""
+    from compare.engines.outside.answers import differences
+
     stated = numbers_of(ARM.tree)
     for off, differs in ((60.0, False), (70.0, True)):
-        result, read = EnginesResult("engines"), {name: values.copy() for name, values in stated.items()}
-        result.tables["engines_read"] = []
-        size = size_of(stated, number) or 1.0
-        is_none = not stated[number].any()
-        read[number][..., -1] += off * RECORDS["float64"].eps * size * (differs or not is_none)
-        reading = {"read": read, "stated": stated, "mended": {number: True} if differs else {}, "copied": None,
-                   "way": FROM_FILE, "lacking": (), "unwritten": ()}  # fmt: skip
-        compare_numbers(result, ARM, RECORDS["float64"], reading)
-        failed = [f"{number} as read"] * (differs and number in ("mass", "moments"))
+        result, read = (
+            empty(),
+            {name: stated[name].copy() for name in ("mass", "inertia", "com", "axis", "gravity", "armature")},
+        )
+        eps, size = RECORDS["float64"].eps, size_of(stated, number)
+        read[number][..., -1] += off * eps * size if size else 1.0 * differs  # the arm has no armature
+        found = differences(read, stated, eps)
+        assert found == (number,) * differs
+        reading = Reading(read, stated, (), found, (), 0.0)
+        compare_numbers(
+            result,
+            ARM,
+            RECORDS["float64"],
+            File(Path(ARM.mjcf), ARM.joints, ARM.coordinates.all_kinds),
+            reading,
+        )
+        failed = [f"{number} as read"] * (differs and number in ("mass", "inertia"))
         assert [check.quantity for check in result.checks if not check.passed] == failed
-        assert [row.number for row in result.tables["engines_read"][:1]] == [number] * differs
+        assert {row.number for row in result.tables["engines_read"]} == ({number} if differs else set())
+        assert bool(result.answers["Other"]["reads"]["rows"]) == differs
 
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
@@ -254,16 +263,11 @@ def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_
 class OfTree(ReadModel):
     """A Tree as an engine that tells where its bodies are."""
 
-    has_links = True
-
     def __init__(self, tree):
-        self.tree, self.stated = tree, numbers_of(tree)
+        self.tree, self.stated, self.used = tree, numbers_of(tree), {}
         self.file = File(ROOT, tree.joint_names, tree.kind)
         joints = self.file.coordinates.places.joints
         self.order = Order(self.file, {k: (joint.q.start, joint.qd.start) for k, joint in enumerate(joints)})
-
-    def fields(self):
-        return {}
 
     def links(self, at):
         return links_of(self.tree, at.x)
@@ -294,32 +298,61 @@ def test_bodies_that_move_as_one():
     assert numbers_of(with_armature)["armature"] == pytest.approx([0.1, 0.2, 0.3])
 
 
-HANGING = """<mujoco><worldbody><body><joint axis="0 1 0"/>
-<inertial pos="0 0 -0.25" mass="1" diaginertia="0.02 0.02 0.001"/></body></worldbody></mujoco>"""
+class Stepping:
+    """An engine that steps MuJoCo's model, by what it has found."""
+
+    def __init__(self, runs):
+        self.runs = runs
+
+    def ask(self, act):
+        if isinstance(self.runs, Exception):
+            raise self.runs
+        return self.runs
 
 
-@pytest.mark.parametrize("scheme, order", [("semi_implicit_euler", 2.0), ("rk4", 4.0), ("own", None)])
-def test_where_an_order_is_higher_tmts_same_scheme_has_it(scheme, order):
-    """A pendulum that is set going where no force acts: semi-implicit Euler's leading error vanishes."""
-    setup = setup_of_file(HANGING)
-    case, method = free_scene(setup), engines.Method("other", "a", 1, scheme)
-    assert integrators.order_of_twin(setup, case, method) == (order and pytest.approx(order, abs=0.1))
+def run(iterations, over):
+    first = Difference(8, "qacc", "hip", 2.4) if over > 1.0 else None
+    return Run(iterations, 50, {1: 1e-9, 10: 1e-7, 100: 5e-4}, first, {}, over, 1.0)
 
 
-@pytest.mark.parametrize("order", (1, 4))
-def test_an_order_is_taken_from_regular_errors_above_the_floor(order):
-    steps = [0.1 / 2**k for k in range(4)]
-    errors = [2e-2 / 2 ** (order * k) for k in range(4)]
-    assert integrators.order_of(steps, errors, 2.2e-16).order == pytest.approx(order)
-    assert integrators.order_of(steps[:3], errors[:3], 2.2e-16) is None  # two orders have not settled
-    assert integrators.order_of(steps, [*errors[:3], 1e-14], 2.2e-16) is None  # rounding
-    assert integrators.order_of(steps, errors, 1e-2) is None
-    finer = [2.0**-k for k in range(7, 14)]
-    assert integrators.order_of(finer, [2e-16 / dt for dt in finer], 2.2e-16) is None  # an eps of each step
+@pytest.mark.parametrize("runs, passes", (
+    ([run(100, 0.99)], True), ([run(100, 1.01)], False), ([run(1, 9.0), run(2, 0.5)], True),
+    ([run(1, 9.0), run(100, 9.0)], False),
+))  # fmt: skip
+def test_a_field_that_more_iterations_make_the_same_is_no_error_of_the_engine(runs, passes):
+    result = empty()
+    add_runs(result, setup_of(), RECORDS["float32"], Stepping(runs))
+    assert [check.passed for check in result.checks] == [passes] and result.checks[0].about is About.ENGINE
+    rows = result.tables["engines_runs"]
+    assert [(row.iterations, row.own_settings) for row in rows] == [
+        (one.iterations, k == 0) for k, one in enumerate(runs)
+    ]
+    assert rows[0].apart_100 == 5e-4 and (rows[0].first_field == "qacc") == (runs[0].over > 1.0)
+    answer = {"reads": {"rows": []}, "equations": {"differ": []}} | result.answers["Other"]
+    assert is_same(answer) == passes
+    said = say(result.finding("cell_runs", answer=answer))
+    assert "0.0005 rad after 100 steps" in said and ("qacc" in said) == (runs[0].over > 1.0)
 
 
-def test_damping_that_acts_is_what_was_read_where_nothing_is_set():
-    for is_set, damping in ((True, 0.1), (False, 0.5)):
-        of = OutsideDynamics("none", ARM.case(damping=0.1), is_set)
-        vars(of)["reading"] = {"read": {"damping": np.full(3, 0.5)}, "lacking": ("stiffness",)}
-        assert of.acting.damping == (damping,) * 3
+def test_an_engine_that_does_not_run_the_file_is_not_judged_by_it():
+    result = empty()
+    add_runs(result, setup_of(), RECORDS["float32"], Stepping(EngineError("no tendons")))
+    assert not result.checks and "no tendons" in say(
+        result.finding("cell_runs", answer=result.answers["Other"])
+    )
+    result = empty()
+    add_runs(result, setup_of(), RECORDS["float32"], Stepping([]))  # it steps no model of MuJoCo's
+    assert not result.checks and not result.notes
+
+
+def test_engines_are_chosen_by_their_names():
+    others = not_chosen("drake,mjx")
+    assert "mjx_float32" in others and not others & {"drake", "mjx", "mujoco"}
+    with pytest.raises(Refused, match="draek is not an engine that reads"):
+        not_chosen("draek")
+
+
+def test_without_another_engine_there_is_nothing_to_answer(monkeypatch):
+    monkeypatch.setattr(Outside, "unavailable", lambda engine: "not installed")
+    assert experiments.skipped("engines", ARM, "mujoco,drake").kind == "none_installed"
+    assert experiments.skipped("engines", ARM, "mujoco,tmt").kind == "none_chosen"

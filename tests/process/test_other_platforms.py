@@ -36,7 +36,7 @@ for package in (compare, tmt):
             assert error.name and error.name.split(".")[0] in OPTIONAL, (module.name, error)
 """
 OPTIONAL = {
-    "dartpy", "heyoka", "jax", "mujoco_warp", "newton", "pinocchio", "pybullet", "pydrake", "sympy", "warp",
+    "heyoka", "jax", "mujoco_warp", "newton", "pinocchio", "pydrake", "sympy", "warp",
     "distributed",
 }  # fmt: skip
 

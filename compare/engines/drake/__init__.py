@@ -52,7 +52,8 @@ class Model(ReadModel):
             raise OtherNames(f"it has no joint {missing[0]!r}")
         # the numbers of its joints in the Tree: of a free body that of its ball
         self.joints = {index: expected[name] for index, name in names.items()}
-        starts, armature, damping = {}, *np.zeros((2, file.coordinates.nv))
+        starts: dict[int, tuple[int, int]] = {}
+        armature, damping = np.zeros((2, file.coordinates.nv))
         for joint, k in zip(map(plant.get_joint, self.joints), self.joints.values()):
             q, v = joint.position_start(), joint.velocity_start()
             starts |= of_free(k, (q + 4, v + 3), (q, v)) if file.is_free(k) else {k: (q, v)}
@@ -82,7 +83,9 @@ class Model(ReadModel):
                 plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame())
         rotors = {}
         for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
-            rotors[actuator.joint().name()] = actuator.default_reflected_inertia()  # of several the last counts
+            rotors[actuator.joint().name()] = (
+                actuator.default_reflected_inertia()
+            )  # of several the last counts
             plant.RemoveJointActuator(actuator)
         for constraint in plant.GetConstraintIds():
             plant.RemoveConstraint(constraint)
@@ -98,8 +101,13 @@ class Model(ReadModel):
         plant, _ = self.parsed(dt)
         plant.mutable_gravity_field().set_gravity_vector(self.used["gravity"])
         for index, k in self.joints.items():
-            joint, place = plant.get_joint(index), self.file.coordinates.places.joints[k]
-            armature, stiffness = (float(self.used[name][place.qd.start]) for name in ("armature", "stiffness"))
+            place = self.file.coordinates.places.joints[k]
+            if place.kind == "ball":  # a free joint is there only once the plant is final
+                continue
+            joint = plant.get_joint(index)
+            armature, stiffness = (
+                float(self.used[name][place.qd.start]) for name in ("armature", "stiffness")
+            )
             if armature:
                 plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(armature)
             if stiffness and has_springs:

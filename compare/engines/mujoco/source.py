@@ -229,7 +229,11 @@ def parsed(origin: Path | str, text: str, floating: bool = False) -> mujoco.MjSp
 
 
 def parsed_file(path: Path, text: str) -> mujoco.MjSpec:
-    spec = mujoco.MjSpec.from_file(os.fsencode(path))
+    if is_urdf(text) and path.suffix != ".urdf":  # MuJoCo chooses how to decode a file by its name
+        spec = mujoco.MjSpec.from_string(text)
+        spec.modelfiledir = str(path.parent)
+    else:
+        spec = mujoco.MjSpec.from_file(os.fsencode(path))
     free = [joint.parent.parent for joint in spec.joints if joint.type == mujoco.mjtJoint.mjJNT_FREE]
     bases = [body.name for body in free if body.parent == spec.worldbody]
     if bases:  # of a URDF: its link with a free joint hangs on another one, which is the world

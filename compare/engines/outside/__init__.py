@@ -22,8 +22,8 @@ import numpy as np
 from ...core.words import listed
 from ...process.workers import Beginning, WorkerEnded, Workers
 from ...robots.case import Case
-from ..mujoco.source import is_urdf
 from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Setting
+from ..mujoco.source import is_urdf
 from . import answers
 from .bodies import passive
 from .file import EngineError, File, TooLong

@@ -51,14 +51,20 @@ def read(name: str, file: File, tree: tmt.Tree) -> tuple[ReadModel, Reading]:
     model = kind(file, record.precision)
     model.stated = stated = model.numbers_stated(tree)
     numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
-    lacking = [number for number in ("damping", "stiffness") if number not in numbers and stated[number].any()]
+    lacking = [
+        number for number in ("damping", "stiffness") if number not in numbers and stated[number].any()
+    ]
     differing = differences(numbers, stated, record.eps)
     for number in differing:
         if number not in OF_BODIES:
             model.set(number, stated[number])
-    if {*differing} & {*OF_BODIES}:  # where places alone differ, bodies are displaced, and their mass is right
+    if {*differing} & {
+        *OF_BODIES
+    }:  # where places alone differ, bodies are displaced, and their mass is right
         moments = (np.linalg.eigvalsh(values["inertia"]) for values in (numbers, stated))
-        is_other = np.abs(np.subtract(*moments)).max(axis=1) > FACTOR * record.eps * size_of(stated, "inertia")
+        is_other = np.abs(np.subtract(*moments)).max(axis=1) > FACTOR * record.eps * size_of(
+            stated, "inertia"
+        )
         is_other |= np.abs(numbers["mass"] - stated["mass"]) > FACTOR * record.eps * size_of(stated, "mass")
         model.set_bodies(np.flatnonzero(is_other).tolist())
     not_set = differences(model.numbers(), stated, record.eps) if differing else ()

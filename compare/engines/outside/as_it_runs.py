@@ -23,7 +23,9 @@ STEPS, LISTED = 100, (1, 10, 100)  # of the file's own; those after which free r
 BEYOND = {"float32": 1e-4, "float64": FACTOR * EPS}
 # that are tried where a field differs: what a solver has not converged to is not the engine's error
 ITERATIONS, LS_ITERATIONS = (2, 4, 100), 50
-SLOW = 20.0  # s, of a run with its compilation, after which only the most iterations are tried
+SLOW = (
+    20.0  # s of the processor, of a run with its compilation, after which only the most iterations are tried
+)
 # an acceleration solves M, and the solver stops at its own tolerance
 SOLVED = "qacc_smooth", "efc_force", "qfrc_constraint", "qacc", "qvel after", "qpos after"
 
@@ -53,7 +55,7 @@ class Run(NamedTuple):
     first: Difference | None
     largest: dict[str, float]  # share of each field over all steps
     over: float  # the largest share over what its field is allowed
-    seconds: float  # with compilation
+    seconds: float  # of the processor, with compilation
 
 
 class Stepper(ABC):
@@ -88,7 +90,10 @@ def runs(kind: Callable[[File, Any], Stepper], precision: str, file: File) -> li
     for count in more if made[0].seconds < SLOW else more[-1:]:
         if made[-1].first is None:
             break
-        model.opt.iterations, model.opt.ls_iterations = count, max(LS_ITERATIONS, source.model.opt.ls_iterations)
+        model.opt.iterations, model.opt.ls_iterations = (
+            count,
+            max(LS_ITERATIONS, source.model.opt.ls_iterations),
+        )
         made.append(one_run(kind, file, model, beyond))
     return made
 
@@ -97,7 +102,7 @@ def one_run(
     kind: Callable[[File, Any], Stepper], file: File, model: mujoco.MjModel, beyond: float, steps: int = STEPS
 ) -> Run:
     """Steps from the first keyframe with its controls, else from qpos0."""
-    begin, engine, data = time.perf_counter(), kind(file, model), mujoco.MjData(model)
+    begin, engine, data = time.process_time(), kind(file, model), mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)  # for the warm start
@@ -113,7 +118,7 @@ def one_run(
         if step in LISTED:
             apart[step] = float(np.abs(data.qpos - engine.get(free).qpos).max())
     of_fields = compared(model, pairs, beyond)
-    seconds = time.perf_counter() - begin
+    seconds = time.process_time() - begin
     return Run(int(model.opt.iterations), int(model.opt.ls_iterations), apart, *of_fields, seconds)
 
 
@@ -155,7 +160,10 @@ def fields(m: mujoco.MjModel, d: mujoco.MjData) -> dict[str, Array]:
     pairs, distances = [pair for pair, _ in contacts], [distance for _, distance in contacts]
     constraints = rows.T @ rows, rows.T @ d.efc_aref[: d.nefc], d.qacc_smooth, force, d.qfrc_constraint
     smooth = d.xpos, M, d.qfrc_bias, d.qfrc_passive, d.qfrc_actuator, pairs, distances
-    return {name: np.array(value, float) for name, value in zip(FIELDS, (*smooth, *constraints, d.qacc, d.qvel, d.qpos))}
+    return {
+        name: np.array(value, float)
+        for name, value in zip(FIELDS, (*smooth, *constraints, d.qacc, d.qvel, d.qpos))
+    }
 
 
 def contacts_of(d: mujoco.MjData) -> Iterator[tuple[tuple[int, int], float]]:

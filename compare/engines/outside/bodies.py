@@ -95,11 +95,20 @@ def body_numbers(
     for k, joint in enumerate(joints):
         if joint.kind == "ball":
             continue
-        turn, shift = movement(before, links_at(coordinates.move(reference, np.eye(coordinates.nv)[joint.qd.start])))
+        turn, shift = movement(
+            before, links_at(coordinates.move(reference, np.eye(coordinates.nv)[joint.qd.start]))
+        )
         axis[k] = shift if joint.kind == "slide" else Rotation.from_matrix(turn).as_rotvec()
         if joint.kind == "hinge":
             anchor[k] = np.linalg.pinv(np.eye(3) - turn, CUTOFF) @ shift
-    return {"mass": mass, "com": com, "inertia": inertia, "axis": axis, "anchor": anchor, "com_moved": com_moved}
+    return {
+        "mass": mass,
+        "com": com,
+        "inertia": inertia,
+        "axis": axis,
+        "anchor": anchor,
+        "com_moved": com_moved,
+    }
 
 
 def size_of(stated: Numbers, number: str) -> float:

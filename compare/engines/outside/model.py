@@ -44,6 +44,7 @@ class ReadModel(ABC):
 
     def set(self, name: str, values: Array) -> None:
         """Set one of `used`, as far as the engine has a public field for it."""
+        return None
 
     def links(self, at: State) -> Sequence[Link]:
         """Its bodies at a state; none: it does not tell."""
@@ -51,6 +52,7 @@ class ReadModel(ABC):
 
     def set_body(self, link: Link, body: Body) -> None:
         """Set mass, centre of mass and inertia of a link, in its axes, all 0: none; as far as the engine has public fields."""
+        return None
 
     @abstractmethod
     def mass_matrix(self, at: State) -> Array:
@@ -66,6 +68,7 @@ class ReadModel(ABC):
 
     def prepare(self, course: Course) -> None:
         """Make what a run needs that does not depend on its start and length: objects, compiled code."""
+        return None
 
     def step_alone(self, course: Course) -> Callable[[], object] | None:
         """A function that makes a step of a run once more, and nothing else; None: no Python runs between steps."""

@@ -9,17 +9,14 @@ import numpy as np
 from tmt.compiled.evaluator import Evaluator
 
 from ...core import timing
-from ...core.check import About
 from ...core.finding import Finding
-from ...engines import LABELS, RECORDS
+from ...engines import LABELS
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.engine import methods_for
 from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.names import INTEGRATORS as MEMBERS
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.step import Step
-from ...engines.outside import OutsideDynamics
-from ...engines.outside.file import EngineError
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...stability.closed_form import COVERED, matrix
@@ -81,8 +78,6 @@ def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
     result.main = main[0].subject.name
     setup.quiet()  # nothing else may run while times are taken
     add_times(setup, result, main)
-    if setup.alone:
-        add_engines(setup, result, main[0])
     scenes = [row for measured in every if measured.subject.kind == "scene" for row in measured.rows]
     add_costs(result, scenes, main)
     hard = [measured for measured in every if measured.subject.kind != "scene"]
@@ -113,30 +108,6 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
             evaluator = Evaluator(subject.tree, quantity.function)
             calls[quantity.name, ways.COMPILED] = partial(evaluator.of_one, *state)
     result.times = timing.fastest(calls, setup.of(50, 20, 2))
-
-
-def add_engines(setup: Setup, result: DerivativesResult, forward: Measured) -> None:
-    """The rows, checks and times of other engines' derivatives of accelerations, of the main subject."""
-    subject, quantity = forward.subject, forward.quantity
-    for name, engine in setup.engines.items():
-        dynamics = None if engine.unavailable() else engine.of(subject.case)
-        try:
-            if not isinstance(dynamics, OutsideDynamics) or not dynamics.has("derivatives"):
-                continue
-        except EngineError:  # it cannot read the file: the experiment `engines` says why
-            continue
-        setup.progress(f"derivatives: {LABELS[name]}")
-        values = ways.side_by_side(dynamics.derivatives(subject.q, subject.qd, subject.tau))
-        exact, scale = quantity.exact_values(subject, 0.0), quantity.scale(subject, 0.0)
-        tolerance = FACTOR * RECORDS[name].eps * scale
-        share = ways.largest_share(exact, values, tolerance)
-        what = f"{quantity.name}: {LABELS[name]} to exact, over its tolerance"
-        result.check(subject.name, what, share, 1.0, "", about=About.ENGINE)
-        row = ways.row_of(subject, quantity, LABELS[name], None, values, exact, tolerance)
-        forward.rows.append(row)
-        result.rows.append(row)
-        state = subject.q[0], subject.qd[0], subject.tau[0]
-        result.times[quantity.name, LABELS[name]] = dynamics.seconds_of_derivatives(*state)
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:

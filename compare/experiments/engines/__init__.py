@@ -26,7 +26,12 @@ from .readings import compare_numbers
 from .tables import AnswerRow, EngineRow, EnginesResult, ReadRow, RunRow
 
 EXPERIMENT = Experiment(
-    order=65, serves_own=False, asks_others=True, quick_speeds=0, options=("--engines",), first_screen=("answer",)
+    order=65,
+    serves_own=False,
+    asks_others=True,
+    quick_speeds=0,
+    options=("--engines",),
+    first_screen=("answer",),
 )
 COMPARED = ("Mbar", "bias", "qdd")
 TABLES = "answer", "read", "runs"
@@ -60,9 +65,10 @@ def rows(setup: Setup) -> EnginesResult:
     for reason, labels in absent.items():
         result.find("absent", engines=labels, reason=reason)
     verdicts = {label: is_same(answer) for label, answer in result.answers.items()}
-    values = {"name": Path(setup.robot.mjcf).name, "verdicts": verdicts, "answers": result.answers}
+    values: dict[str, Any] = {"name": Path(setup.robot.mjcf).name, "verdicts": verdicts}
+    values["rows"] = result.tables["engines_answer"]
     result.headline = result.finding("headline", **values)
-    result.top.insert(0, result.finding("answer", **values))
+    result.top.append(result.finding("answer", **values))
     return result
 
 
@@ -78,12 +84,15 @@ def is_same(answer: dict[str, Any]) -> bool | None:
 def add_answer(result: EnginesResult, setup: Setup, record: EngineRecord) -> None:
     """The row of an engine, and its sentence."""
     answer, label = result.answers[record.label], record.label
-    cells = {cell: say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")}
+    cells = {
+        cell: say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")
+    }
     reads, equations, runs = cells.values()
-    row = AnswerRow(engine=label, precision=record.precision, reads_the_file=reads, equations=equations, as_it_runs=runs)
+    row = AnswerRow(
+        engine=label, precision=record.precision, reads_the_file=reads, equations=equations, as_it_runs=runs
+    )
     result.tables["engines_answer"].append(row)
-    result.top.append(result.finding("engine", row=row))
-    setup.progress(say(result.top[-1]))
+    setup.tell(say(result.finding("engine", row=row)))
 
 
 def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None:
@@ -91,7 +100,9 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     record, label, nv = engine.record, engine.record.label, setup.robot.coordinates.nv
     answer, (fixed, by_speed, by_pair) = result.answers[label], COMPILATION
     seconds = fixed + by_speed * nv + by_pair * nv**2
-    setup.progress(say(result.finding("asks", engine=label, seconds=seconds if record.compiles else None, speeds=nv)))
+    setup.progress(
+        say(result.finding("asks", engine=label, seconds=seconds if record.compiles else None, speeds=nv))
+    )
     dynamics = engine.of(setup.robot.case())
     try:
         compare_numbers(result, setup.robot, record, dynamics.file, dynamics.reading)
@@ -104,7 +115,8 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
         result.tables["engines_read"].append(ReadRow(label, cause=cause, why_not=str(error)))
         result.find("not_asked", why=kind, engine=label, reason=reason, cause=cause)
     except TooLong as error:
-        answer.setdefault("why_not", {"kind": "TooLong", "reason": str(error)})
+        answer["why_not"] = {"kind": "TooLong", "reason": str(error)}
+        result.tables["engines_read"].append(ReadRow(label, why_not=str(error)))
         result.find("not_asked", why="TooLong", engine=label, reason=str(error), cause=None)
     except EngineError as error:
         answer["why_not"] = {"kind": "EngineError", "reason": str(error)}
@@ -140,7 +152,14 @@ def compare_quantity(
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
     unit = quantity.unit(sample.tree)
     check = result.check(
-        record.label, f"{name} to exact", distance[worst], tolerance[worst], unit, note, True, about=About.ENGINE
+        record.label,
+        f"{name} to exact",
+        distance[worst],
+        tolerance[worst],
+        unit,
+        note,
+        True,
+        about=About.ENGINE,
     )
     names = Coordinates(sample.tree.joint_names, sample.tree.kind).speeds
     result.rows.append(EngineRow(
@@ -176,11 +195,13 @@ def add_runs(result: EnginesResult, setup: Setup, record: EngineRecord, dynamics
         return
     answer["runs"] = {"runs": runs, "unit": unit}
     for run in runs:
-        first = run.first and {f"first_{name}": value for name, value in run.first._asdict().items()}
-        apart = {f"apart_{steps}": run.apart.get(steps) for steps in (1, 10, 100)}
+        first: dict[str, Any] = (
+            {f"first_{name}": value for name, value in run.first._asdict().items()} if run.first else {}
+        )
+        apart: dict[str, Any] = {f"apart_{steps}": run.apart.get(steps) for steps in (1, 10, 100)}
         result.tables["engines_runs"].append(RunRow(
             engine=record.label, iterations=run.iterations, ls_iterations=run.ls_iterations, own_settings=run is runs[0],
-            unit=unit, **apart, **(first or {}),
+            unit=unit, **apart, **first,
         ))  # fmt: skip
     # what a solver has not converged to is not the engine's error
     last, note = runs[-1], ""

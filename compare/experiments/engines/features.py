@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from ...engines import Array, EngineRecord
 from ...engines.mujoco import read
@@ -59,10 +60,16 @@ def class_values(elements: Sequence[Any], kind: str, field: str, default: Any) -
 def classes_of_joints(spec: Spec) -> None:
     """What a class has of the outermost one is lost, as if the class had no <joint> of its own."""
     outermost = spec.default.joint
-    for field, default in (("axis", (0.0, 0.0, 1.0)), ("pos", (0.0, 0.0, 0.0)), *dict.fromkeys(PASSIVE, None).items()):
+    for field, default in (
+        ("axis", (0.0, 0.0, 1.0)),
+        ("pos", (0.0, 0.0, 0.0)),
+        *dict.fromkeys(PASSIVE, None).items(),
+    ):
         for joint in [joint for joint in spec.joints if joint.classname.name != spec.default.name]:
             of_class = getattr(joint.classname.joint, field)
-            if np.array_equal(of_class, getattr(outermost, field)) and np.array_equal(of_class, getattr(joint, field)):
+            if np.array_equal(of_class, getattr(outermost, field)) and np.array_equal(
+                of_class, getattr(joint, field)
+            ):
                 put([joint], **{field: default}) if default else zero([joint], field)
 
 
@@ -79,9 +86,12 @@ def several(spec: Spec) -> Iterator[list[Any]]:
     return (list(body.joints) for body in spec.bodies if len(body.joints) > 1)
 
 
-def place_all_as_the_last(spec: Spec) -> None:
-    for joints in several(spec):
-        put(joints[:-1], pos=joints[-1].pos)
+def place_first_on_carrier(spec: Spec) -> None:
+    """All joints of a body but the last are where they were if the body were placed after them."""
+    for body in spec.bodies:
+        for joint in list(body.joints)[:-1]:
+            turn = Rotation.from_quat(np.roll(body.quat, -1))
+            joint.pos = turn.inv().apply(np.subtract(joint.pos, body.pos))
 
 
 def place_later_at_origin(spec: Spec) -> None:
@@ -124,15 +134,15 @@ FEATURES: Mapping[str, Callable[[Spec], None]] = {
         [geom for geom in spec.geoms if not (geom.contype or geom.conaffinity)], mass=0.0),
     "pos of joints in default classes": lambda spec: class_values(spec.joints, "joint", "pos", np.zeros(3)),
     "classes around one without <joint>": classes_of_joints,
-    "stiffness of joints": lambda spec: zero(spec.joints, "stiffness", "springdamper"),
-    "springdamper of joints": lambda spec: zero(spec.joints, "springdamper"),
-    "damping of joints": lambda spec: zero(spec.joints, "damping", "springdamper"),
     "damping, armature and stiffness of free joints": lambda spec: zero(
         [joint for joint in spec.joints if joint.type.name == "mjJNT_FREE"], *PASSIVE),
+    "springdamper of joints": lambda spec: zero(spec.joints, "springdamper"),
+    "stiffness of joints": lambda spec: zero(spec.joints, "stiffness"),
+    "damping of joints": lambda spec: zero(spec.joints, "damping"),
     "armature of actuators": lambda spec: zero([a for a in spec.actuators if hasattr(a, "armature")], "armature"),
     "armature of joints that no motor or position actuator drives": undriven_armature,
     "armature of joints": lambda spec: zero(spec.joints, "armature"),
-    "pos of the joints of a body but that of the last": place_all_as_the_last,
+    "pose of a body for all of its joints but the last": place_first_on_carrier,
     "pos of the joints of a body but that of the first": place_later_at_origin,
     "ref of joints that share a body": lambda spec: put([joint for joints in several(spec) for joint in joints], ref=0.0),
     "pose of bodies on the world without a joint": fixed_roots,
@@ -148,7 +158,9 @@ class Entry(NamedTuple):
     place: int  # in all numbers as one row
 
 
-def causes_of(record: EngineRecord, file: File, reading: Reading, entries: Sequence[Entry]) -> dict[Entry, str]:
+def causes_of(
+    record: EngineRecord, file: File, reading: Reading, entries: Sequence[Entry]
+) -> dict[Entry, str]:
     """The features without which MuJoCo has the engine's number, by entries; each is tried beside those that were found."""
     found, causes = list[str](), dict[Entry, str]()
     for _ in range(2):  # a feature may explain only beside one that is found after it

@@ -16,7 +16,15 @@ from ...robots import Robot
 from .features import Entry, causes_of
 from .tables import EnginesResult, ReadRow
 
-UNITS = {"gravity": "m/s2", "mass": "kg", "com": "m", "com_moved": "m", "inertia": "kg m2", "axis": "", "anchor": "m"}
+UNITS = {
+    "gravity": "m/s2",
+    "mass": "kg",
+    "com": "m",
+    "com_moved": "m",
+    "inertia": "kg m2",
+    "axis": "",
+    "anchor": "m",
+}
 OF_SPEEDS = {"armature": {"rad": "kg m2", "m": "kg"}, "damping": {"rad": "N m s/rad", "m": "N s/m"},
              "stiffness": {"rad": "N m/rad", "m": "N/m"}}  # fmt: skip
 CHECKED = "mass", "inertia"  # no convention makes these differ
@@ -27,9 +35,14 @@ SINGLE = float(np.finfo(np.float32).eps)
 ROUNDING = "digits beyond single precision, in which MuJoCo keeps the vertices of meshes"
 
 
-def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, file: File, reading: Reading) -> None:
+def compare_numbers(
+    result: EnginesResult, robot: Robot, record: EngineRecord, file: File, reading: Reading
+) -> None:
     """Rows of what an engine has read differently, and checks of the masses and inertias."""
-    label, rows = record.label, [ReadRow(record.label, number, "joints", why_not=None) for number in reading.lacking]
+    label, rows = (
+        record.label,
+        [ReadRow(record.label, number, "joints", why_not=None) for number in reading.lacking],
+    )
     for number in [number for number in CHECKED if number in reading.read]:
         largest = np.abs(reading.read[number] - reading.stated[number]).max(initial=0.0)
         bar = FACTOR * record.eps * size_of(reading.stated, number)
@@ -37,7 +50,9 @@ def compare_numbers(result: EnginesResult, robot: Robot, record: EngineRecord, f
     listed = [number for number in reading.differing if not {*FOLLOWS.get(number, ())} & {*reading.differing}]
     entries = [entry for number in listed for entry in differing(record, reading, number)]
     causes = causes_of(record, file, reading, entries) if entries else {}
-    is_meshed = bool(entries) and any(any(meshes) for _, meshes in Source(file.path, file.floating).mesh_geoms)
+    is_meshed = bool(entries) and any(
+        any(meshes) for _, meshes in Source(file.path, file.floating).mesh_geoms
+    )
     for entry in entries:
         number, place = entry
         values, stated = (float(np.ravel(which[number])[place]) for which in (reading.read, reading.stated))

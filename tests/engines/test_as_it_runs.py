@@ -1,0 +1,162 @@
+"""The file as it runs: MuJoCo in the engine's place, with one change of its model, differs first in the field that this changes."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from compare.engines import RECORDS
+from compare.engines.outside import Outside, as_it_runs
+from compare.engines.outside.as_it_runs import BEYOND, contacts_of, fields, one_run, runs
+from compare.engines.outside.file import File
+
+# two hinges with dry friction, a servo, and a ball that falls on the floor and rolls
+RUNNING = """<mujoco><option timestep="0.004" iterations="{}" ls_iterations="{}"/><default><joint damping="0.1"/></default><worldbody>
+<geom name="floor" type="plane" size="1 1 0.1"/><body name="upper" pos="0 0 1"><joint name="hip" axis="0 1 0" frictionloss="0.2" armature="0.01"/>
+<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="0.5" contype="0" conaffinity="0"/><body name="lower" pos="0.3 0 0">
+<joint name="knee" axis="0 1 0" frictionloss="0.2"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="0.4"
+contype="0" conaffinity="0"/></body></body><body name="ball" pos="1 0 0.11"><freejoint name="free"/><geom name="round" size="0.1" mass="0.3"/></body>
+</worldbody><actuator><position joint="hip" kp="20" kv="1"/></actuator><keyframe>
+<key qpos="0.3 0.5 1 0 0.11 1 0 0 0" qvel="0 0 0.3 0 0 0 0 0" ctrl="0.4"/></keyframe></mujoco>"""
+
+
+class Mujoco(as_it_runs.Stepper):
+    """MuJoCo itself, with a change of the model, or of the order of what it returns."""
+
+    change = staticmethod(lambda model: None)
+    is_reversed = False
+
+    def __init__(self, file, model):
+        self.model = mujoco.MjModel.__copy__(model)
+        self.change(self.model)
+
+    def put(self, data):
+        copied = mujoco.MjData(self.model)
+        mujoco.mj_copyState(self.model, data, copied, mujoco.mjtState.mjSTATE_INTEGRATION)
+        return copied
+
+    def step(self, data):
+        mujoco.mj_step(self.model, data)
+        return data
+
+    def get(self, data):
+        if self.is_reversed and data.nefc:
+            for name in ("efc_aref", "efc_force"):
+                getattr(data, name)[: data.nefc] = getattr(data, name)[: data.nefc][::-1].copy()
+            rows = data.efc_J.reshape(-1, self.model.nv)[: data.nefc]
+            rows[:] = rows[::-1].copy()
+            for contact in data.contact:
+                contact.geom = contact.geom[::-1]
+        return data
+
+
+def changed(change, **more):
+    return type("Changed", (Mujoco,), {"change": staticmethod(change), **more})
+
+
+@pytest.fixture
+def file(tmp_path):
+    def made(iterations=100, ls_iterations=50):
+        path = tmp_path / "robot.xml"
+        path.write_text(RUNNING.format(iterations, ls_iterations))
+        return File(path, (), ())
+
+    return made
+
+
+CHANGES = {
+    "xpos": lambda m: m.body_pos.__setitem__((2, 0), 0.3 + 1e-3),
+    "M": lambda m: m.dof_armature.__setitem__(0, 0.02),
+    "qfrc_bias": lambda m: m.opt.gravity.__setitem__(2, -9.8),
+    "qfrc_passive": lambda m: m.jnt_stiffness.__setitem__((0, ...), 0.1),
+    "qfrc_actuator": lambda m: m.actuator_gainprm.__setitem__((0, 0), 21.0),
+    "contacts": lambda m: m.geom_contype.__setitem__(slice(None), 0),
+    "dist": lambda m: m.geom_size.__setitem__((1, 0), 0.1 + 1e-4),
+    "efc_J": lambda m: setattr(m.opt, "cone", mujoco.mjtCone.mjCONE_ELLIPTIC),
+    "efc_aref": lambda m: m.geom_solref.__setitem__((slice(None), 0), 0.03),
+    "efc_force": lambda m: m.dof_frictionloss.__setitem__(0, 0.19),
+    "qvel after": lambda m: setattr(m.opt, "integrator", mujoco.mjtIntegrator.mjINT_IMPLICITFAST),
+}
+
+
+@pytest.mark.parametrize("field", CHANGES)
+def test_the_first_other_field_is_that_which_a_change_of_the_model_changes_first(field, file):
+    made = runs(changed(CHANGES[field]), "float32", file())
+    assert made[0].first.field == field and made[0].over > 1.0
+    owner = {"xpos": "lower", "M": "hip", "qfrc_passive": "hip", "qfrc_actuator": "hip", "efc_force": "hip"}
+    if field in owner:
+        assert made[0].first.of == owner[field]
+    assert len(made) == 1  # iterations are those of the last try already
+
+
+def test_the_same_model_has_the_same_fields_whatever_the_order_of_rows_and_pairs(file):
+    for kind in (Mujoco, changed(lambda m: None, is_reversed=True)):
+        (run,) = runs(kind, "float64", file())
+        assert run.first is None and run.over <= 1.0 and run.apart == {1: 0.0, 10: 0.0, 100: 0.0}
+
+
+@pytest.mark.parametrize("precision", BEYOND)
+@pytest.mark.parametrize("share, differs", ((0.9, False), (1.1, True)))
+def test_a_field_just_inside_and_just_outside_of_its_precision(precision, share, differs, file):
+    """Of its largest entry: of the damping, of which the speed of one joint is the largest at each step."""
+    by = 1.0 + share * BEYOND[precision]
+    run = runs(changed(lambda m: m.dof_damping.__imul__(by)), precision, file())[0]
+    assert (run.first is not None and run.first.field == "qfrc_passive") == differs
+
+
+def test_what_a_solver_has_not_converged_to_goes_with_more_iterations(file):
+    """A warm start that is lost: another force of friction after one iteration, the same one after more."""
+
+    class Cold(Mujoco):
+        def put(self, data):
+            copied = super().put(data)
+            copied.qacc_warmstart[:] = 0.0
+            return copied
+
+    first, *more = runs(Cold, "float32", file(1, 1))
+    assert first.iterations == 1 and first.first.field == "efc_force"
+    assert more[-1].first is None and more[-1].iterations > 1 and more[-1].ls_iterations == 50
+    assert all(run.first for run in more[:-1])
+
+
+def test_free_runs_begin_at_the_first_keyframe_with_its_controls(file):
+    """How far apart they are is what a script with plain MuJoCo finds."""
+    made = one_run(
+        changed(CHANGES["qfrc_actuator"]),
+        file(),
+        mujoco.MjModel.from_xml_string(RUNNING.format(100, 50)),
+        1e-4,
+    )
+    ends = []
+    for gain in (20.0, 21.0):
+        m = mujoco.MjModel.from_xml_string(RUNNING.format(100, 50))
+        m.actuator_gainprm[0, 0] = gain
+        d = mujoco.MjData(m)
+        mujoco.mj_resetDataKeyframe(m, d, 0)
+        for _ in range(100):
+            mujoco.mj_step(m, d)
+        ends.append(d.qpos.copy())
+    assert made.apart[100] == pytest.approx(np.abs(ends[1] - ends[0]).max(), rel=1e-3)
+
+
+def test_contacts_that_do_not_act_are_none(file):
+    m = mujoco.MjModel.from_xml_path(str(file().path))
+    m.geom_gap[:] = 1.0
+    d = mujoco.MjData(m)
+    mujoco.mj_resetDataKeyframe(m, d, 0)
+    mujoco.mj_forward(m, d)
+    assert d.ncon and not list(contacts_of(d)) and not fields(m, d)["contacts"].size
+
+
+ENGINES = [name for name in ("mjx_float32", "warp", "newton") if not Outside(name).unavailable()]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_engine_runs_a_file_as_mujoco_does_once_its_solver_has_converged(engine, file, tmp_path):
+    from compare.engines.outside import answers
+    from compare.run.reference import compared_with
+
+    path = file(1, 2).path
+    made = Outside(engine).of(compared_with("model", str(path)).robot.case()).ask(answers.runs_as_it_is)
+    assert made[0].first is not None and made[-1].first is None and made[-1].apart[100] < 1e-4
+    assert RECORDS[engine].precision == "float32"
