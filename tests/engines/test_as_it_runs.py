@@ -1,4 +1,4 @@
-"""The file as it runs: MuJoCo in the engine's place, with one change of its model, differs first in the field that this changes."""
+"""The file as it runs: MuJoCo in the engine's place, with one change, differs first in the field that this changes."""
 
 import mujoco
 import numpy as np
@@ -10,11 +10,14 @@ from compare.engines.outside.as_it_runs import BEYOND, contacts_of, fields, one_
 from compare.engines.outside.file import File
 
 # two hinges with dry friction, a servo, and a ball that falls on the floor and rolls
-RUNNING = """<mujoco><option timestep="0.004" iterations="{}" ls_iterations="{}"/><default><joint damping="0.1"/></default><worldbody>
-<geom name="floor" type="plane" size="1 1 0.1"/><body name="upper" pos="0 0 1"><joint name="hip" axis="0 1 0" frictionloss="0.2" armature="0.01"/>
+RUNNING = """<mujoco><option timestep="0.004" iterations="{}" ls_iterations="{}"/>
+<default><joint damping="0.1"/></default><worldbody>
+<geom name="floor" type="plane" size="1 1 0.1"/><body name="upper" pos="0 0 1">
+<joint name="hip" axis="0 1 0" frictionloss="0.2" armature="0.01"/>
 <geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="0.5" contype="0" conaffinity="0"/><body name="lower" pos="0.3 0 0">
 <joint name="knee" axis="0 1 0" frictionloss="0.2"/><geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.02" mass="0.4"
-contype="0" conaffinity="0"/></body></body><body name="ball" pos="1 0 0.11"><freejoint name="free"/><geom name="round" size="0.1" mass="0.3"/></body>
+contype="0" conaffinity="0"/></body></body><body name="ball" pos="1 0 0.11">
+<freejoint name="free"/><geom name="round" size="0.1" mass="0.3"/></body>
 </worldbody><actuator><position joint="hip" kp="20" kv="1"/></actuator><keyframe>
 <key qpos="0.3 0.5 1 0 0.11 1 0 0 0" qvel="0 0 0.3 0 0 0 0 0" ctrl="0.4"/></keyframe></mujoco>"""
 
