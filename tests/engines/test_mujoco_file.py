@@ -238,8 +238,12 @@ def test_meshes_that_are_not_there_are_left_out_and_said():
 def test_a_mesh_that_is_not_there_cannot_give_an_inertia(inertial):
     text = BOX.format(STATED if inertial else "")
     text = text.replace("<asset>", f'<compiler {inertial}="true"/><asset>') if inertial else text
-    with pytest.raises(ModelError, match=r"'b' is that of its mesh hull\.stl, which cannot be read"):
+    with pytest.raises(ModelError, match=r"'b' is that of its mesh hull\.stl, which cannot be read$"):
         Source(text)
+    with pytest.raises(ModelError, match=r"body 1, .* is that of its mesh hull\.stl"):
+        Source(text.replace(' name="b"', ""))
+    with pytest.raises(ModelError, match=r"mesh package:/r/hull\.stl, .* beside the file"):
+        Source(text.replace("hull.stl", "package://r/hull.stl"))
 
 
 def test_the_base_of_a_urdf_floats_where_that_is_asked():

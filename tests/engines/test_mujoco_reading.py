@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from models import KINDS, PATHS, gymnasium_files, random_tree, with_features
 from trees import random_state
 
+import tmt
 from compare.engines.mujoco import ModelError, Source, engine, read
 from compare.engines.mujoco.inventory import REASONS
 from compare.engines.mujoco.parameters import stated_numbers
@@ -234,3 +235,34 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes_something(op
 def test_a_tensor_may_be_off_by_rounding_of_the_sum_of_its_moments():
     row = rows_of(mjcf(BODY.format("1 1.5 2", "")))["b", "inertia"]
     assert row.tolerance == pytest.approx(64 * EPS * 4.5)
+
+
+ROD = """<mujoco><worldbody><body><joint name="j" axis="0 1 0" {}/>
+  <inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("ref", [0.0, 25.0, -70.0])
+def test_a_pendulum_hangs_at_the_position_that_the_file_calls_its_reference(ref):
+    """In degrees in the file; about its axis gravity turns it back with m g l sin(q - ref)."""
+    reading = read(ROD.format(f'ref="{ref}" stiffness="3" springref="10"'))
+    q = np.array([[-0.4], [0.0], [1.3]])
+    weight = 2.0 * 9.81 * 0.5 * np.sin(q - np.radians(ref))
+    assert tmt.gravity_balance(q, reading.tree) == pytest.approx(weight)
+    assert tmt.spring_torque(q, reading.tree) == pytest.approx(3.0 * (q - np.radians(10.0)))
+    dynamics = engine(reading).of(case_of(reading.tree))
+    assert dynamics.gravity_balance(q) == pytest.approx(weight)
+    assert reading.qpos0 == pytest.approx([np.radians(ref)])
+
+
+LINK = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}
+  <body name="b" pos="0.3 0 0"><joint name="k" axis="0 1 0"/>
+  <inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>"""
+MASS = '<inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>'
+
+
+def test_a_file_with_a_body_more_on_a_joint_than_the_solution_is_refused_with_both_numbers():
+    more, less = read(LINK.format(MASS)), read(LINK.format(""))
+    assert len(engine(more, more).bodies) == 2 and len(engine(less, less).bodies) == 1
+    for file, solution, found, stated in ((more, less, 1, 0), (less, more, 0, 1)):
+        with pytest.raises(ModelError, match=f"on joint j: {found}, in the solution {stated}"):
+            engine(file, solution)

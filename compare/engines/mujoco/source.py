@@ -29,7 +29,7 @@ UNREAD = ("Error opening file", "no decoder found")
 DECODED = ".stl", ".obj", ".msh"
 PACKAGES = "is looked for in a folder NAME beside the file or above it, else beside the file"
 ADVICE = {  # by what MuJoCo says of a file that it cannot compile
-    "which cannot be read": f"package://NAME/... {PACKAGES}",
+    "package:/": f"package://NAME/... {PACKAGES}",
     "must have positive eigenvalues": "the order of fullinertia is xx, yy, zz, xy, xz, yz",
     "mass and inertia of moving bodies": "boundmass and boundinertia of <compiler> give some, or both joints in one body",
 }
@@ -269,8 +269,9 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
     names = {asset.name: asset.file for asset in assets}
     geoms = [geom for geom in spec.geoms if {geom.meshname, geom.hfieldname} & names.keys()]
     for geom in filter(gives_inertia, geoms):
-        why = f"is that of its mesh {names[geom.meshname or geom.hfieldname]}, which cannot be read"
-        raise ValueError(f"the inertia of body {geom.parent.name!r} {why}")
+        body, file = list(spec.bodies).index(geom.parent), names[geom.meshname or geom.hfieldname]
+        name = repr(geom.parent.name) if geom.parent.name else f"{body}, which has no name,"
+        raise ValueError(f"the inertia of body {name} is that of its mesh {file}, which cannot be read")
     locked.delete_geoms(spec, geoms)
 
 
