@@ -1,31 +1,14 @@
 """python -m compare: compare the two models and write a report."""
 
 import os
+import shlex
 import sys
 from collections.abc import Sequence
 
-from .process import interrupt, streams
-
-if __name__ == "__main__":
-    streams.prepare()
-    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")  # it clears up after an interrupt
-    # nothing is rendered: no further process looks for a display
-    os.environ.setdefault("MUJOCO_GL", "disabled")
-    # the matrices are small, and other processes compute too: threads of a product would wait for each other
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    interrupt.listen()  # before anything that takes its time
-    if not interrupt.PARENT and any(":" in word for word in sys.argv[1:]):  # perhaps a user's own equations
-        status, end = interrupt.status_of_child()
-        interrupt.settle()
-        if end:
-            why = f"perhaps by your equations: {end}"
-            streams.say_error(f"the run ended before its end, {why}; an earlier report is unchanged")
-        interrupt.leave(status)
-
-import shlex
-
-from .cli.command_line import EQUATIONS, FLEET, request
 from .core.errors import Refused, described
+from .process import apart, interrupt, streams
+
+EQUATIONS, FLEET = "equations", "fleet"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def status_of(arguments: Sequence[str]) -> int:
     # imports are slow: only what the request needs
+    command = shlex.join(["python", "-m", "compare", *arguments])
     if arguments[:1] == [FLEET]:
         from .fleet.command import fleet_status
 
@@ -49,7 +33,9 @@ def status_of(arguments: Sequence[str]) -> int:
     if arguments[:1] == [EQUATIONS]:
         from .export.command import equations_status
 
-        return equations_status(arguments[1:], shlex.join(["python", "-m", "compare", *arguments]))
+        return equations_status(arguments[1:], command)
+    from .cli.command_line import request
+
     options = request(arguments)
     if options.version:
         from .report.provenance import OURS, installed
@@ -58,16 +44,29 @@ def status_of(arguments: Sequence[str]) -> int:
         return 0
     from .run.command import carry_out
 
-    return carry_out(options, shlex.join(["python", "-m", "compare", *arguments]))
+    return carry_out(options, command)
 
 
-if __name__ == "__main__":
+def run() -> int:
+    """The command line of this process, to its end, with what it has begun."""
     try:
         status = main()
     except SystemExit as stop:  # --help, or a wrong word
         status = int(stop.code or 0)
     interrupt.settle()
-    interrupt.clear_up()
-    for stream in (sys.stdout, sys.stderr):
-        streams.Stream(stream).flush()
-    interrupt.leave(status)
+    interrupt.at_end.close()
+    return status
+
+
+if __name__ == "__main__":
+    interrupt.listen()  # before anything that takes its time
+    streams.prepare()
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")  # it clears up after an interrupt
+    # nothing is rendered: no further process looks for a display
+    os.environ.setdefault("MUJOCO_GL", "disabled")
+    # the matrices are small, and other processes compute too: threads of a product would wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    has_own = any(":" in word for word in sys.argv[1:])  # perhaps a user's own equations
+    if has_own:
+        from compare.__main__ import run  # by a name that the child finds
+    interrupt.leave(apart.in_child(run) if has_own else interrupt.answered(run))

@@ -1,7 +1,7 @@
 """A cause: what explains failing checks, as the tables, results.json and the terminal list it."""
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 from typing import Any
 
 
@@ -25,5 +25,6 @@ class Cause:
 
     def record(self) -> dict[str, Any]:
         """As in results.json and in a report."""
-        about = {"rank": self.rank, "place": self.place, "stated": self.stated}
-        return about | {"found": self.explains, "text": self.text}
+        values = {"stated": self.stated, "found": self.explains}
+        unknown = {name: None for name, value in values.items() if isinstance(value, float) and not isfinite(value)}
+        return {"rank": self.rank, "place": self.place} | values | unknown | {"text": self.text}

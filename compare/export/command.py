@@ -76,7 +76,6 @@ def equations_status(arguments: Sequence[str], command: str) -> int:
 def write_equations(options: argparse.Namespace, command: str) -> int:
     """Write and check the files; the exit status."""
     started, terminal = time.perf_counter(), Terminal()
-    interrupt.Now.line = "interrupted; nothing was written"
     from ..engines.mujoco import ModelError  # imports are slow
     from ..run.reference import compared_with
     from . import checks, programs
@@ -103,7 +102,7 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             raise Refused(error) from None
 
     with terminal.progress("writes the equations"), TemporaryDirectory() as folder:
-        interrupt.undo.append(partial(shutil.rmtree, folder, ignore_errors=True))
+        interrupt.at_end.callback(shutil.rmtree, folder, ignore_errors=True)
         texts = written()
         kilobytes, seconds = sum(map(len, texts.values())) / 1000, time.perf_counter() - started
         terminal.say(block("export", "written", names=list(texts), kilobytes=kilobytes, seconds=seconds))

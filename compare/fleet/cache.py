@@ -45,7 +45,7 @@ def locked(out: Path) -> Iterator[None]:
         if not is_held and folder.fcntl:
             advice = "use another folder (--out), or wait until it has ended"
             raise Refused(f"another fleet is writing to {out}; {advice}")
-        interrupt.Now.line = f"interrupted; {RESUME}"
+        interrupt.on_interrupt(RESUME)
         yield
 
 
@@ -66,7 +66,7 @@ def write_whole(path: Path, content: bytes | dict[str, bytes]) -> None:
         else:
             shutil.rmtree(part, ignore_errors=True)
             unpacked(content, part)
-        with interrupt.postponed:
+        with interrupt.undivided():
             if path.is_dir():
                 shutil.rmtree(path)
             part.replace(path)

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar, cast
 
@@ -47,7 +47,7 @@ class Outcome(NamedTuple, Generic[T]):
 def own_folder() -> str:
     """A folder for temporary files of this process and its children, deleted when the command ends."""
     tempfile.tempdir = tempfile.mkdtemp(prefix="fleet-")  # of the forkserver's socket too
-    interrupt.undo.append(partial(shutil.rmtree, tempfile.tempdir, ignore_errors=True))
+    interrupt.at_end.callback(shutil.rmtree, tempfile.tempdir, ignore_errors=True)
     return tempfile.tempdir
 
 
@@ -93,7 +93,7 @@ class Pool:
         """Refused if there is nobody left to answer."""
 
     def close(self) -> None:
-        self.processes.close(at_once=True)
+        self.processes.close()
 
 
 def alone(function: Callable[..., T], arguments: Arguments, folder: str, memory: int) -> Outcome[T]:
@@ -196,4 +196,4 @@ def on_worker(function: Callable[..., T], arguments: Arguments, limit: float, ve
         try:
             return pool.outcome(pool.submit(function, *arguments))
         finally:
-            pool.processes.close()
+            pool.processes.close(at_once=False)

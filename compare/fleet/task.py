@@ -12,7 +12,6 @@ from typing import NamedTuple
 from ..core.text import block
 from ..engines.mujoco import ModelError, read
 from ..experiments import TIMED
-from ..process.workers import Clock
 from ..report import folder, provenance
 from ..report.terminal import Terminal
 from ..robots.case import SEED
@@ -69,12 +68,12 @@ def compare_file(shown: str, options: FleetOptions, bundle: dict[str, bytes]) ->
     out.mkdir()
     setup = experiment.setup_of(compared, options.is_quick)
     with ThreadPoolExecutor(1) as workers:
-        examined = experiment.Run(names, setup, out, Terminal(), workers, Clock()).examined()
+        examined = experiment.Run(names, setup, out, Terminal(), workers).examined()
     origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
     origin["seconds"] = round(time.process_time() - began, 1)
-    report, parts = write_report(out, examined, reasons, origin, compared)
+    report = write_report(out, examined, reasons, origin, compared)
     written = {name: (out / name).read_bytes() for name in folder.files(out)}
     shutil.rmtree(top)
-    judge(row, report, parts.lines, compared.reference)
+    judge(row, report, compared.reference)
     row.seconds, row.has_report = round(time.process_time() - began, 2), True
     return Compared(row, written)

@@ -1,103 +1,161 @@
-"""Ctrl-C, SIGTERM and SIGHUP end a run with status 2 within a second.
+"""Ctrl-C, SIGTERM and SIGHUP end a run with status 2, whatever it is doing.
 
-A Python signal handler waits until C code returns, for seconds in a compilation or a run in MuJoCo. So signals
-are blocked, in workers too, and a thread waits for them; where they cannot be (Windows), a handler has to do.
-Only `python -m compare` uses this.
+Python hears a signal in the main thread, between two of its own instructions: not in a compilation or in a run
+of MuJoCo. So `python -m compare` runs in a second thread, while the main one waits.
 """
 
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from multiprocessing import resource_tracker
-from typing import NoReturn
+from multiprocessing.connection import Connection
 
-from ..core.errors import how_ended
+from .streams import Stream, say_error
 
-undo: list[Callable[[], object]] = []  # functions to call before the process ends, last first
-postponed = threading.RLock()  # held while an interrupt has to wait, and while the run ends
-PARENT = int(os.environ.pop("COMPARE_PARENT", 0))  # the process that waits for this one, see status_of_child
-FINISHED = 200  # added to the exit status of such a child: no status that a user's own code ends with
+POLL = 0.1  # s
+PATIENCE = 10.0  # s in a user's own function after which a log names it; a terminal shows it sooner
+at_end = ExitStack()  # what ends and clears up a run; last first
 
 
 class Now:
-    listening = False  # an interrupt raises no KeyboardInterrupt
-    settled = False  # the exit status is decided
-    line = "interrupted; an earlier report is unchanged"
+    lock = threading.RLock()
+    is_listening = False  # an interrupt raises no KeyboardInterrupt in the run
+    asked = 0  # interrupts so far
+    is_ending = False  # a further one cuts off what the first has begun
+    is_interrupted = False
+    is_settled = False  # an interrupt is too late
+    outcome = "nothing was written"
+    waits: tuple[str, float] | None = None  # a user's own function that is running, and since when
+    parent: Connection | None = None
 
 
 def listen() -> None:
-    """From now on an interrupt ends the process. Ignored signals (nohup, background) stay ignored."""
-    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    """From now on an interrupt is counted. Ignored signals (nohup, background) stay ignored."""
+    names = [name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    numbers = [getattr(signal, name) for name in names]
     numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
-    Now.listening = True
-    if PARENT:
-        threading.Thread(target=end_with_parent, daemon=True).start()
-    if not hasattr(signal, "pthread_sigmask"):
-        for number in numbers:  # a thread: the main one may be in a block that postpones interrupts
-            signal.signal(number, lambda *_: threading.Thread(target=end, daemon=True).start())
-    elif numbers:
-        # the tracker inherits this: it outlives the run
-        before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    for number in numbers:
+        signal.signal(number, hear)
+    Now.is_listening = True
+    shield(False)
+
+
+def hear(*_: object) -> None:
+    Now.asked += 1
+    if Now.is_ending:
+        raise KeyboardInterrupt
+
+
+def shield(is_on: bool = True) -> None:
+    """Whether this thread, and what it starts, is deaf to what a terminal sends to all processes of a run."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(
+            signal.SIG_BLOCK if is_on else signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGHUP)
+        )
+
+
+def answered(run: Callable[[], int]) -> int:
+    """The exit status of a run; 2 after an interrupt."""
+    status: Future[int] = Future()
+
+    def carry_out() -> None:
         resource_tracker.ensure_running()  # unblocks signals where it starts
-        signal.signal(signal.SIGHUP, before)
-        signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
-        threading.Thread(target=end_when_asked, args=(numbers,), daemon=True).start()
+        shield()
+        status.set_result(run())
+
+    threading.Thread(target=carry_out, daemon=True).start()
+    told = ""
+    while True:
+        with suppress(TimeoutError):
+            return status.result(POLL)
+        name, seconds = waited_for()
+        if seconds > PATIENCE and name != told and not os.isatty(2):
+            say_error(f"waiting for {name}, {seconds:.0f} s")
+            told = name
+        if Now.asked:
+            with Now.lock:
+                Now.is_interrupted = not Now.is_settled
+            if Now.is_interrupted:
+                return end()
+
+
+def end() -> int:
+    """Clear up after an interrupt; the exit status."""
+    name, seconds = waited_for()
+    where = f" while waiting for {name}, {seconds:.0f} s" if name else ""
+    tell("ending")
+    Stream.silent, Now.is_ending = True, True  # the thread of the run goes on
+    with suppress(BaseException):
+        at_end.close()
+    Now.is_ending = False
+    with suppress(OSError):
+        overwritten = "\r" * os.isatty(2)  # ^C
+        os.write(2, f"{overwritten}interrupted{where}; {Now.outcome}\n".encode())
+    return 2
+
+
+def waited_for() -> tuple[str, float]:
+    """A user's own function that is running, and for how long, s."""
+    waits = Now.waits
+    return (waits[0], time.monotonic() - waits[1]) if waits else ("", 0.0)
+
+
+@contextmanager
+def ends_with(stack: ExitStack) -> Iterator[None]:
+    """Close a stack after this block, or after an interrupt."""
+    at_end.callback(stack.close)
+    with stack:
+        try:
+            yield
+        finally:
+            stay()
+
+
+@contextmanager
+def undivided() -> Iterator[None]:
+    """A block that an interrupt waits for."""
+    with nullcontext() if Now.is_interrupted else Now.lock:
+        stay()
+        yield
+
+
+def stay() -> None:
+    """Go no further after an interrupt, except in the main thread, which ends the run."""
+    if Now.is_interrupted and threading.current_thread() is not threading.main_thread():
+        threading.Event().wait()
 
 
 def settle() -> None:
     """From now on an interrupt does not change the exit status."""
-    with postponed:
-        Now.settled = True
+    with undivided():
+        Now.is_settled = True
 
 
-def end_when_asked(numbers: list[int]) -> None:
-    signal.sigwait(numbers)
-    end()
+def tell(kind: str, what: object = None) -> None:
+    """Tell the process that waits for this one; see `apart`."""
+    if Now.parent:
+        with suppress(OSError):
+            Now.parent.send((kind, what))
 
 
-def end() -> None:
-    with postponed:
-        if not Now.settled:
-            clear_up()
-            with suppress(OSError):
-                os.write(2, ("\r" * os.isatty(2) + Now.line + "\n").encode())  # overwrites ^C on a terminal
-            leave(2)
+def on_interrupt(outcome: str) -> None:
+    """What an interrupt will say of the results."""
+    Now.outcome = outcome
+    tell("outcome", outcome)
 
 
 def is_interrupt(error: BaseException) -> bool:
     """Whether an exception is Ctrl-C; else a user's own code raised it."""
-    return isinstance(error, KeyboardInterrupt) and not Now.listening
+    return isinstance(error, KeyboardInterrupt) and not Now.is_listening
 
 
-def end_with_parent() -> None:
-    while os.getppid() == PARENT:
-        time.sleep(0.5)
-    end()
-
-
-def leave(status: int) -> NoReturn:
+def leave(status: int) -> None:
     """End this process at once; what comes after main could end with another status."""
-    os._exit(status + FINISHED * bool(PARENT))
-
-
-def status_of_child() -> tuple[int, str]:
-    """Run this command line in a child process, where a user's own code may end the process without a word.
-
-    The exit status and "", or 2 and how the child ended if not by `leave`. The child answers an interrupt.
-    """
-    environment = os.environ | {"COMPARE_PARENT": str(os.getpid())}
-    child = subprocess.Popen([sys.executable, *sys.orig_argv[1:]], env=environment)
-    undo.extend([lambda: leave(2), child.wait, child.terminate])
-    code = child.wait()
-    return (code - FINISHED, "") if code >= FINISHED else (2, how_ended(code))
-
-
-def clear_up() -> None:
-    for act in reversed(undo):
-        with suppress(Exception):
-            act()
+    for stream in (sys.stdout, sys.stderr):
+        Stream(stream).flush()
+    os._exit(status)

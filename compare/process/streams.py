@@ -2,11 +2,13 @@
 
 import os
 import sys
+from io import TextIOBase
 from typing import TextIO
 
 from ..core.words import in_one_line
 
 PROGRAM = "python -m compare"
+MOST_PRINTED = 20_000  # characters of a user's own code
 
 
 class Stream:
@@ -45,9 +47,33 @@ class Stream:
         return getattr(self.stream, "encoding", None) or "utf-8"
 
 
+class Capped(TextIOBase):
+    """stderr for what a user's own code prints: so much, and then a line that says so."""
+
+    printed = 0  # characters, of all code together
+
+    def __init__(self) -> None:
+        self.stream: TextIO = getattr(sys.stderr, "stream", sys.stderr)
+
+    def write(self, text: str) -> int:
+        room = MOST_PRINTED - Capped.printed
+        Capped.printed += len(text)
+        if room > 0:
+            self.stream.write(text[:room])
+            if len(text) > room:
+                self.stream.write(
+                    f"\n{PROGRAM}: your code has printed {MOST_PRINTED} characters; no more is shown\n"
+                )
+        return len(text)
+
+    def flush(self) -> None:
+        self.stream.flush()
+
+
 def say_error(line: str) -> None:
     """One line on stderr, if it can be written."""
-    print(in_one_line(" ".join(f"{PROGRAM}: {line}".split())), file=Stream(sys.stderr), flush=True)
+    stream = getattr(sys.stderr, "stream", sys.stderr)  # also while a user's own code prints
+    print(in_one_line(" ".join(f"{PROGRAM}: {line}".split())), file=Stream(stream), flush=True)
 
 
 def prepare() -> None:

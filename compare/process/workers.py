@@ -1,11 +1,9 @@
 """Processes that make calls: those of a run, of an engine, of a fleet; and the clock of a run."""
 
 import ctypes
-import importlib
 import logging
 import os
 import shutil
-import sys
 import tempfile
 import threading
 import time
@@ -15,10 +13,8 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing import active_children, parent_process
-from multiprocessing import context as contexts
-from multiprocessing.process import BaseProcess
-from typing import Any, Generic, ParamSpec, TypeVar
+from multiprocessing import active_children, get_context, parent_process
+from typing import Any, ParamSpec, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
 
@@ -33,7 +29,7 @@ except ImportError:  # Windows: no memory limit
 P = ParamSpec("P")
 T = TypeVar("T")
 Answer = tuple[Any, BaseException | None, float]  # what a call has returned or raised, its processor time, s
-KILLED, UNEXPECTED = -9, 256  # exit codes: after SIGKILL; of a lasting process that ends with the status 0
+KILLED, LEFT = -9, 120  # exit codes: after SIGKILL; of a process that ends in a call with the status 0
 LONGEST_PATH = 70  # bytes, of the folder of the forkserver's socket, whose whole path may have 107
 
 
@@ -66,12 +62,16 @@ class Clock:
         return sum(seconds for name, seconds in list(self.taken) if name == task)
 
 
+class Current:
+    clock = Clock()  # of the run that this process makes, and of all of its workers
+
+
 class WorkerEnded(RuntimeError):
-    """The process of a call ended before its answer."""
+    """The process of a call ended before its answer. how: killed by SIGKILL."""
 
     def __init__(self, how: str):
-        super().__init__("a worker process was killed; an earlier report is unchanged")
-        self.how = how  # killed by SIGKILL
+        super().__init__("a worker process was killed")
+        self.how = how
 
 
 @dataclass(frozen=True)
@@ -102,55 +102,6 @@ class Beginning:
         os._exit(1)
 
 
-class Whole(BaseProcess):
-    """A process whose start is not interrupted, and whose end is noticed after what it has sent.
-
-    One that is half started complains when its parent ends. Pebble loses a call if it sees that end first.
-    """
-
-    is_noticed = False
-
-    def start(self) -> None:
-        with interrupt.postponed:
-            super().start()
-
-    def terminate(self) -> None:
-        self.is_noticed = True
-        super().terminate()
-
-    def is_alive(self) -> bool:
-        """Whether it runs; True once more after it has failed, until Pebble asks again."""
-        was_noticed, is_alive = self.is_noticed, super().is_alive()
-        self.is_noticed = was_noticed or not is_alive
-        return is_alive or not (was_noticed or self.exitcode == 0)
-
-
-class Lasting(Whole, contexts.SpawnProcess):
-    """A process that makes calls as long as it is asked."""
-
-    @property
-    def exitcode(self) -> int | None:
-        """None, or how it ended, which is never as it should: Pebble does not notice the status 0."""
-        code = super().exitcode
-        return UNEXPECTED if code == 0 else code
-
-
-if sys.platform != "win32":
-
-    class Forked(Whole, contexts.ForkServerProcess):
-        """A process that makes one call, forked from one that has loaded what the call needs."""
-
-
-@dataclass
-class Call(Generic[T]):
-    """A call of workers. Its future has the answer, however often it is tried."""
-
-    function: Callable[[], T]
-    task: str  # of the clock
-    future: "Future[T]" = field(default_factory=Future)
-    tries: int = 0
-
-
 @dataclass(eq=False)
 class Workers:
     """Processes that make calls at the same time; one that ends, or takes too long, is replaced."""
@@ -160,28 +111,29 @@ class Workers:
     limit: float | None = None  # s for a call
     retries: int = 0  # of a call whose process is killed by SIGKILL (no memory, an operator)
     is_fresh: bool = False  # each call has a process of its own
-    clock: Clock = field(default_factory=Clock)  # of the calls
+    pool: ProcessPool = field(init=False)
     pending: set["Future[Any]"] = field(default_factory=set)
 
     def __post_init__(self) -> None:
         self.pool = self.new_pool()
-        interrupt.undo.append(kill_children)
+        interrupt.at_end.callback(self.close)
+
+    @property
+    def clock(self) -> Clock:
+        return Current.clock
 
     def new_pool(self) -> ProcessPool:
         """A pool whose processes start with its first call."""
-        kind: type[BaseProcess] = contexts.SpawnProcess if self.is_fresh else Lasting
-        if self.is_fresh and hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH:
-            kind = Forked
-        context = contexts.SpawnContext()
-        context.Process = kind  # type: ignore[assignment,misc]  # a class of processes, which Pebble starts
+        is_forked = hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH
+        context = get_context("forkserver" if self.is_fresh and is_forked else "spawn")
         return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=context)
 
     def submit(self, function: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> "Future[T]":
         """The future of a call; it raises what the function raises, TimeoutError or WorkerEnded."""
-        call = Call(partial(function, *arguments, **named), self.clock.task)
-        self.pending.add(call.future)
-        self.start(call)
-        return call.future
+        answer: Future[T] = Future()
+        self.pending.add(answer)
+        self.start(partial(function, *arguments, **named), Current.clock.task, answer)
+        return answer
 
     def map(self, function: Callable[..., T], *arguments: Iterable[Any]) -> Iterator[T]:
         """The values of a function in their order; all calls are submitted at once."""
@@ -192,44 +144,40 @@ class Workers:
         """Wait until all calls are done, before times are measured."""
         wait(self.pending.copy())
 
-    def start(self, call: Call[T]) -> None:
+    def start(self, call: Callable[[], T], task: str, answer: "Future[T]", tries: int = 1) -> None:
         if not self.pool.active:  # its processes have ended while they were idle
             self.pool = self.new_pool()
-        call.tries += 1
-        scheduled = self.pool.schedule(timed, (call.function,), timeout=self.limit)
-        scheduled.add_done_callback(partial(self.finish, call))
 
-    def finish(self, call: Call[T], scheduled: "Future[Answer]") -> None:
-        """Hand on the answer to a call, or make the call again; in a thread of the pool."""
-        value, error = None, None
-        try:
-            value, error, seconds = scheduled.result()
-            self.clock.taken.append((call.task, seconds))
-        except ProcessExpired as expired:
-            is_killed = expired.exitcode == KILLED
-            if is_killed and call.tries <= self.retries:
-                self.start(call)
-                return
-            times = f", {call.tries} times" if is_killed and self.retries else ""
-            error = WorkerEnded(how_ended(expired.exitcode) + times)
-        except BrokenProcessPool:
-            error = WorkerEnded("its process ended")
-        except Exception as reason:  # TimeoutError; arguments or a value that cannot be sent
-            error = reason
-        self.pending.discard(call.future)
-        if error is None:
-            call.future.set_result(value)  # type: ignore[arg-type]  # without an error it is a T
-        else:
-            call.future.set_exception(error)
+        def finish(scheduled: "Future[Answer]") -> None:
+            """Hand on the answer, or make the call again; in a thread of the pool."""
+            value, error = None, scheduled.exception()  # TimeoutError; what cannot be sent
+            if error is None:
+                value, error, seconds = scheduled.result()
+                Current.clock.taken.append((task, seconds))
+            elif isinstance(error, ProcessExpired):
+                is_killed = error.exitcode == KILLED
+                if is_killed and tries <= self.retries:
+                    self.start(call, task, answer, tries + 1)
+                    return
+                times = f", {tries} times" if is_killed and self.retries else ""
+                error = WorkerEnded(how_ended(error.exitcode) + times)
+            elif isinstance(error, BrokenProcessPool):
+                error = WorkerEnded("its process ended")
+            self.pending.discard(answer)
+            if error is None:
+                answer.set_result(value)  # type: ignore[arg-type]  # without an error it is a T
+            else:
+                answer.set_exception(error)
 
-    def close(self, at_once: bool = False) -> None:
+        self.pool.schedule(timed, (call,), timeout=self.limit).add_done_callback(finish)
+
+    def close(self, at_once: bool = True) -> None:
         """End the processes; at once: in the middle of their calls, and those of other workers too."""
         self.retries = 0
         self.pool.stop()
         if at_once:
             kill_children()
         self.pool.join()
-        interrupt.undo.remove(kill_children)
 
 
 def kill_children() -> None:
@@ -239,26 +187,24 @@ def kill_children() -> None:
 
 @contextmanager
 def start_workers() -> Iterator[Workers]:
-    """The two workers of a run, for figures and scenes."""
-    workers = Workers(2, Beginning())
+    """The two workers of a run, for figures and scenes; its clock begins."""
+    Current.clock, workers = Clock(), Workers(2, Beginning())
     try:
         yield workers
     finally:
-        workers.close(at_once=True)
-
-
-def load_modules(*modules: str) -> None:
-    for name in modules:
-        importlib.import_module(name)
+        workers.close()
 
 
 def timed(function: Callable[[], Any]) -> Answer:
-    value, raised, began = None, None, time.process_time()
+    """The answer to a call. Pebble does not notice a process that ends in it with status 0."""
+    value, raised, began, leave = None, None, time.process_time(), os._exit
+    os._exit = lambda status: leave(status or LEFT)
     try:
         value = function()
     except BaseException as error:
         error.place = place(error)  # type: ignore[attr-defined]  # it is sent without its traceback
         raised = error
+    os._exit = leave
     give_back_memory()
     return value, raised, time.process_time() - began
 

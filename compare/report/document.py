@@ -4,7 +4,7 @@ Both are rendered from document.md.jinja; here is chosen how much of each part i
 """
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from ..robots import Robot
 from . import tables
 from .images import embedded
 from .questions import answers
-from .verdict import Figure, Parts, Report, Section, failures, headline, outcome, passed, standing
+from .verdict import Figure, Report, Section, failures, headline, outcome, standing
 
 MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
@@ -51,45 +51,34 @@ class Listing(NamedTuple):
 class Document:
     """One report in one medium. folder: where its figures are, for a page; None: report.md."""
 
-    def __init__(self, report: Report, parts: Parts, folder: Path | None = None):
-        self.report, self.parts, self.page = report, parts, folder is not None
-        self.file = "index.html" if self.page else "report.md"
+    def __init__(self, report: Report, folder: Path | None = None):
+        self.report, self.page = report, folder is not None
         data: dict[str, Any] = {"page": self.page, "embedded": embedded}
         data |= {"outcome": outcome, "standing": standing, "headline": headline}
         data["drawn"] = folder / "figures" if folder else None
         # its attributes are the macros
         self.template: Any = environment().get_template("document.md.jinja").make_module(data)
-        self.answers = parts.attempt("the questions", None, answers, report.sections, report.robot)
+        self.answers = answers(report.sections, report.robot)
 
-    def body(self) -> list[str]:
-        """All parts below the verdict; those that break are left out."""
-        report = self.report
-        texts = [self.made("the first screen", self.first_screen)]
-        texts.append(self.made("the introduction", self.introduction))
-        if report.causes:
-            texts.append(self.template.causes(tables.of_causes(report.causes)))
-        if self.answers is not None:
-            texts.append(self.template.questions(self.answers))
-        for section in report.sections:
-            missing = self.template.missing(section.name, section.title)
-            texts.append(self.made(section.name, self.section, section, otherwise=missing))
-        texts.append(self.template.skipped(report.skipped) if report.skipped else "")
-        return [*texts, self.template.provenance(tables.of_origin(report.origin))]
-
-    def made(self, name: str, make: Callable[..., str], *arguments: Any, otherwise: str = "") -> str:
-        return self.parts.attempt(f"{name} in {self.file}", otherwise, make, *arguments)
-
-    def text(self, body: Sequence[str]) -> str:
-        """The whole document, with what could not be made of it."""
+    def text(self) -> str:
+        """The whole document."""
         report, robot = self.report, self.report.robot
-        good = passed(report.sections) and not self.parts.broken
         lines = report.verdict.split("\n")
         title = block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
-        head = self.template.head(title, report.first_lines, lines, self.parts.lines, report.top, good)
+        parts = [self.template.head(title, report.first_lines, lines, report.top, report.passed)]
+        parts += [self.first_screen(), self.introduction()]
+        if report.causes:
+            parts.append(self.template.causes(tables.of_causes(report.causes)))
+        if self.answers is not None:
+            parts.append(self.template.questions(self.answers))
+        parts += map(self.section, report.sections)
+        parts.append(self.template.skipped(report.skipped) if report.skipped else "")
+        parts.append(self.template.provenance(tables.of_origin(report.origin)))
+        text = joined(parts)
         if not self.page:
-            return joined([head, *body])
-        html = Markup(MarkdownIt("commonmark", {"html": True}).render(joined([head, *body])))
-        values = {"title": title, "good": good, "links": self.links(), "body": html}
+            return text
+        html = Markup(MarkdownIt("commonmark", {"html": True}).render(text))
+        values = {"title": title, "good": report.passed, "links": self.links(), "body": html}
         return environment().get_template("page.html.jinja").render(values)
 
     def links(self) -> list[tuple[str, bool]]:
@@ -100,15 +89,13 @@ class Document:
     def first_screen(self) -> str:
         """A line for each experiment, the pictures; on the page also what explains that checks fail."""
         report = self.report
-        none: list[Picture] = []
-        pictures = self.parts.attempt("the pictures of the first screen", none, self.pictures)
         failed = [check for kind in failures(report.sections) for check in kind]
         failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
         if report.causes:
             table = tables.of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank")
             title = "Cause" if len(report.causes) == 1 else "Causes"
             failing = Listing(len(report.causes), table, name="causes", title=title)
-        return self.template.first_screen(report.sections, report.skipped, pictures, failing)
+        return self.template.first_screen(report.sections, report.skipped, self.pictures(), failing)
 
     def pictures(self) -> list[Picture]:
         """The pictures, those in which something fails first; a figure of what fails, if none shows it."""
@@ -139,12 +126,11 @@ class Document:
 
     def section(self, section: Section) -> str:
         checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
-        failed = [check for check in section.failed if check not in section.explained]
         not_judged = [check for check in checks if not check.judged]
         figures = section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [figure for figure in figures if figure in first or figure.moves]
-        lists = {"failing": listing(failed, few), "not_judged": listing(not_judged, few)}
+        lists = {"failing": listing(section.failed, few), "not_judged": listing(not_judged, few)}
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
         return self.template.section(section, lists, of_section, first, folded)

@@ -2,8 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,53 +10,31 @@ import numpy as np
 import pandas as pd
 
 from ..core.rows import Row, columns_of
-from ..core.text import escaped
-from .document import Document, joined
+from .document import Document
 from .folder import files, save
-from .verdict import Parts, Report, passed
+from .verdict import Report
 
 COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsheet would compute
 
 
-def write(folder: Path, report: Report, parts: Parts | None = None) -> Parts:
-    """Write the files of a report, beside its figures; parts that break are left out and named."""
-    parts = Parts() if parts is None else parts
+def write(folder: Path, report: Report) -> None:
+    """Write the files of a report, beside its figures."""
     (folder / "tables").mkdir()
     for section in report.sections:
         for name, rows in section.tables.items():
-            text = parts.attempt(f"tables/{name}.csv", "", csv, rows)
-            if text:
-                save(folder / "tables" / f"{name}.csv", text)
-    made = [check.record() for section in report.sections for check in section.result.checks]
-    found = [cause.record() for cause in report.causes]
-    checks, causes = (records(parts, *named) for named in (("check", made), ("cause", found)))
-    documents = Document(report, parts), Document(report, parts, folder)
-    bodies: list[list[str]] = [parts.attempt(document.file, [], document.body) for document in documents]
-    for document, body in zip(documents, bodies):
-        text = parts.attempt(f"the head of {document.file}", "", document.text, body)
-        if text or not document.page:
-            save(folder / document.file, text or joined([*map(escaped, parts.lines), *body]))
+            save(folder / "tables" / f"{name}.csv", csv(rows))
+    save(folder / "report.md", Document(report).text())
+    save(folder / "index.html", Document(report, folder).text())
     results = {
-        "passed": passed(report.sections) and not parts.broken,
+        "passed": report.passed,
         "reference": report.reference,
-        "checks": checks + [check.record() for check in parts.checks],
-        "causes": causes,
+        "checks": [check.record() for section in report.sections for check in section.result.checks],
+        "causes": [cause.record() for cause in report.causes],
         "skipped": [{"experiment": name, "reason": reason} for name, reason in report.skipped],
         # its files: what may be replaced by the next report
         "provenance": report.origin | {"files": [*files(folder), "results.json"]},
     }
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
-    return parts
-
-
-def records(parts: Parts, name: str, found: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Those of the records that can be written as JSON."""
-    written = []
-    for number, record in enumerate(found, start=1):
-        what = f"{name} {number} in results.json"
-        text = parts.attempt(what, "", partial(json.dumps, allow_nan=False), record)
-        written += [json.loads(text)] if text else []
-    return written
 
 
 def csv(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:

@@ -3,10 +3,9 @@
 import os
 import re
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from textwrap import TextWrapper
 from typing import IO, cast
 
@@ -18,17 +17,18 @@ from ..core.words import in_one_line
 from ..process import interrupt
 from ..process.streams import Stream
 
+LONG = 5.0  # s, after which it is said for how long something has been going on
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
 class Terminal:
-    """Prints lines on stdout, and the progress on stderr if that is a terminal, else now and then a line."""
+    """Prints lines on stdout, and the progress on stderr if that is a terminal."""
 
     def __init__(self) -> None:
         self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
         self.lines, self.screen = console(self.out), console(self.err)
         self.status: Status | None = None
-        self.text = ""
+        self.text, self.since = "", time.monotonic()
         self.how_far: Callable[[], list[str]] = list  # count, name: before the text; asked at every moment
 
     def say(self, text: str = "", style: str = "") -> None:
@@ -55,43 +55,42 @@ class Terminal:
             style = ""
 
     def show(self, text: str) -> None:
-        self.text = text
+        self.text, self.since = text, time.monotonic()
 
     @contextmanager
-    def progress(self, text: str, period: float = 25.0) -> Iterator[None]:
-        """Show the progress during this block, if that is possible; else print it every period (s)."""
+    def progress(self, text: str) -> Iterator[None]:
+        """Show the progress during this block, on a terminal that can overwrite a line."""
         self.show(text)
         if not self.screen.is_terminal or self.screen.is_dumb_terminal:
-            ended = threading.Event()
-            threading.Thread(target=self.speak_until, args=(ended, period), daemon=True).start()
-            try:
-                yield
-            finally:
-                ended.set()
+            yield
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
-        interrupt.undo.append(wipe)
         self.status = self.screen.status(self, spinner=spinner)
-        try:
-            with self.status:
-                yield
-        finally:
-            self.status = None
-            interrupt.undo.remove(wipe)
+        with ExitStack() as stack, interrupt.ends_with(stack):
+            stack.callback(self.stop)
+            self.status.start()
+            yield
 
-    def speak_until(self, ended: threading.Event, period: float) -> None:
-        while not ended.wait(period):
-            self.say(f"  {joined(self.how_far(), self.text)}")
+    def stop(self) -> None:
+        if self.status:
+            self.status.stop()
+            self.status = None
+            os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode() * Stream.silent)
 
     def line(self) -> str:
-        """The progress, as far as there is room, no name twice."""
+        """The progress, as far as there is room, no name twice; for how long, where it takes long."""
         self.screen.width = max(self.err.columns() or 80, 20)
-        room = self.screen.width - 6  # the spinner, and what a terminal shows of Ctrl-C
         parts, text = self.how_far(), in_one_line(self.text)
         for part in parts:
             text = text.removeprefix(f"{part}: ")
+        name, seconds = interrupt.waited_for()
+        text, seconds = (
+            (f"waiting for {name}", seconds) if seconds > LONG else (text, time.monotonic() - self.since)
+        )
+        for_long = f", {seconds:.0f} s" if seconds > LONG else ""
+        room = self.screen.width - 6 - len(for_long)  # the spinner, and what a terminal shows of Ctrl-C
         line = joined(parts, text)
-        return line if len(line) <= room else line[: room - 3] + "..."
+        return (line if len(line) <= room else line[: room - 3] + "...") + for_long
 
     def __rich__(self) -> Text:
         return Text(self.line(), no_wrap=True)
@@ -103,10 +102,3 @@ def console(stream: Stream) -> Console:
 
 def joined(parts: Sequence[str], text: str) -> str:
     return ": ".join(filter(None, (", ".join(parts), text)))
-
-
-def wipe() -> None:
-    Stream.silent = True
-    time.sleep(0.02)  # what another thread is writing comes before this
-    with suppress(OSError):
-        os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode())

@@ -1,12 +1,11 @@
 """The outcome of a report: its sections, which checks fail, what explains that, what could not be made."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from ..core.cause import Cause
 from ..core.check import About, Check, Result
-from ..core.errors import described
 from ..core.finding import Finding
 from ..core.records import Experiment
 from ..core.rows import Row
@@ -14,7 +13,6 @@ from ..core.text import block, say, screen
 from ..core.words import capital
 from ..robots import Robot
 
-Value = TypeVar("Value")
 UNKNOWN = Experiment()
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
@@ -47,7 +45,6 @@ class Section:
     tolerance: str
     result: Result
     figures: list[Figure] = field(default_factory=list)
-    explained: list[Check] = field(default_factory=list)  # failing checks that are gone without the causes
     record: Experiment = UNKNOWN  # what the program knows of it
 
     @property
@@ -85,10 +82,11 @@ class Report(NamedTuple):
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
     first_lines: Sequence[str] = ()  # what is said of it
+    is_complete: bool = True  # an interrupt ends a run before all experiments are finished
 
     @property
     def passed(self) -> bool:
-        return passed(self.sections)
+        return self.is_complete and passed(self.sections)
 
     @property
     def top(self) -> list[str]:
@@ -143,18 +141,12 @@ def verdict(
     """
     checked = [section for section in sections if section.result.checks]
     checks = [check for section in checked for check in section.judged]
-    explained = [check for section in sections for check in section.explained]
-    stating = [check for section in checked if section.record.states_causes for check in section.failed]
     failing, top = failures(checked), worst(checked)
-    unconfirmed = [check for check in failing.unconfirmed if check not in explained]
-    failing = failing._replace(unconfirmed=unconfirmed)
     differing = [section for section in checked if section.record.compares and failures([section]).differing]
     lines = block(
         "verdict", "verdict", compared=subject or "The two models", robot=robot or "the robot",
         experiments=experiments, sections=sections, checked=checked, checks=checks, causes=causes,
         names=[section.name for section in differing or checked], differ=bool(differing), failing=failing,
-        explained=explained, stating=stating,
-        unexplained=[check for check in checks if check.failed and check not in stating + explained],
         top=top if top and top.value and not any(failing) else None,
     )  # fmt: skip
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
@@ -162,7 +154,7 @@ def verdict(
 
 def outcome(section: Section, kind: str = "outcome") -> str:
     """Whether a section passes, in a sentence; `standing`: in a few words."""
-    numbers = {"checks": section.judged, "failed": section.failed, "explained": section.explained}
+    numbers = {"checks": section.judged, "failed": section.failed}
     counts = {name: len(checks) for name, checks in numbers.items()}
     return say(Finding("verdict", kind, {**counts, "failing": failures([section])}))
 
@@ -184,29 +176,3 @@ def headline(section: Section) -> str:
     shares = [check.over_tolerance for check in passing if check.over_tolerance is not None]
     numbers = {"passed": len(passing), "checks": len(section.judged), "share": max(shares, default=None)}
     return say(Finding("verdict", "checks_passed", numbers))
-
-
-class Parts:
-    """The parts of a report that raised, by name, each with its error in one line."""
-
-    def __init__(self) -> None:
-        self.broken: dict[str, str] = {}
-
-    def attempt(self, name: str, otherwise: Value, make: Callable[..., Value], *arguments: Any) -> Value:
-        """make(*arguments); if it raises, `otherwise`, and the part is listed as broken."""
-        try:
-            return make(*arguments)
-        except Exception as error:
-            self.broken.setdefault(name, described(error))
-            return otherwise
-
-    @property
-    def lines(self) -> list[str]:
-        return [block("verdict", "incomplete", name=name, why=why) for name, why in self.broken.items()]
-
-    @property
-    def checks(self) -> list[Check]:
-        result = Result("report")
-        for name, why in self.broken.items():
-            result.check("", f"{name} is complete", None, 0.0, "", why, rule="equal", about=About.PROGRAM)
-        return result.checks

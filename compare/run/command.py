@@ -1,6 +1,7 @@
 """One comparison of the command line: compute, draw, write the report, print the verdict."""
 
 import argparse
+import importlib
 import os
 import time
 from collections.abc import Sequence
@@ -14,9 +15,9 @@ from ..core.text import block, say
 from ..engines.mujoco import ModelError
 from ..engines.own import OwnError
 from ..experiments import EXPERIMENTS, skipped
-from ..process.streams import say_error
-from ..process.workers import WorkerEnded, load_modules, start_workers
-from ..report.folder import new_report
+from ..process import interrupt
+from ..process.workers import WorkerEnded, start_workers
+from ..report.folder import UNCHANGED, exchange, has_report, new_report
 from ..report.terminal import Terminal
 from ..robots import Robot
 from ..robots.case import SEED
@@ -25,43 +26,48 @@ from ..robots.states import MOST_SPEEDS
 from .reference import Compared, compared_with
 
 if TYPE_CHECKING:  # they take long to load
-    from ..report.verdict import Parts, Report
-    from .examine import Examined
+    from ..report.verdict import Report
+    from .examine import Examined, Run
 
-Written = tuple["Report", "Parts"]
-COMPUTING = "compare.run.examine", "tmt.compiled.machine"  # modules that take long to load
-DRAWING = "compare.report.style", *COMPUTING
+# modules that take long to load
+DRAWING, COMPUTING = "compare.report.style", "tmt.compiled.machine"
+INTERRUPTED = "interrupted"  # folder in that of an earlier report
 
 
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compare the models and write the report; the exit status. Refused: that is not possible."""
     started, terminal, is_alone = time.perf_counter(), Terminal(), options.experiment != "all"
+    given, path = options.mjcf or "", os.path.abspath(options.mjcf) if options.mjcf else None
+    out = Path(options.out).absolute()  # a user's own code may change the current folder
+    for name in ("scenes", "controls", "write"):
+        value = getattr(options, name)
+        setattr(options, name, value and os.path.abspath(value))
     try:
-        compared = compared_with(options.reference, options.mjcf, options.joints, floating=options.floating)
+        asked = options.reference, path, options.joints, given or None
+        compared = compared_with(*asked, floating=options.floating)
         if options.scenes:
             scenes = read_scenes(options.scenes, compared.robot)
             compared = compared._replace(robot=compared.robot.with_scenes(scenes))
         if is_alone and (reason := skipped(options.experiment, compared.robot, options.engines)):
             about = {"experiment": options.experiment, "robot": compared.robot.name, "reason": say(reason)}
             raise Refused(block("run", "does_not_apply", **about))
-        with new_report(options.out) as folder:
-            report, parts = compute(options, command, compared, folder, terminal)
-    except (ModelError, OwnError, SceneError, WorkerEnded) as error:
-        raise Refused(error) from None
-    good = report.passed and not parts.broken
+        with new_report(out, options.out) as folder:
+            report = compute(options, command, compared, folder, terminal)
+    except WorkerEnded as error:
+        raise Refused(f"{error}; {interrupt.Now.outcome}") from None
+    except (ModelError, OwnError, SceneError) as error:
+        raise Refused(str(error).replace(str(path), given)) from None
     terminal.say()
-    terminal.say_lines(report.verdict.split("\n"), "bold green" if good else "bold red")
-    for line in parts.lines:
-        say_error(line)
-    path, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
-    terminal.say(block("run", "report", path=path, seconds=seconds))
+    terminal.say_lines(report.verdict.split("\n"), "bold green" if report.passed else "bold red")
+    page, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
+    terminal.say(block("run", "report", path=page, seconds=seconds))
     terminal.say_lines(report.answer if is_alone else ())
-    return 0 if good else 1
+    return 0 if report.passed else 1
 
 
 def compute(
     options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal
-) -> Written:
+) -> "Report":
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     request = compared.request_of(options)
@@ -69,9 +75,30 @@ def compute(
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
     names, reasons = applying([options.experiment] if is_alone else [*EXPERIMENTS], robot, options.engines)
+    run: Run | None = None
+
+    def written(is_complete: bool = True) -> "Report":
+        assert run is not None
+        found = run.examined() if is_complete else run.finished()
+        times = {"seconds": round(time.perf_counter() - started, 1)} | durations(run.clock)
+        return write_report(folder, found, reasons, origin | times, compared, names * (not is_complete))
+
+    def write_finished() -> None:
+        """After an interrupt: the experiments that are finished, beside an earlier report."""
+        is_any = run is not None and any(name in run.clock.ended for name in names)
+        if not (interrupt.Now.is_interrupted and is_any):
+            return
+        is_beside = has_report(folder.parent)
+        shown = Path(options.out, INTERRUPTED) if is_beside else Path(options.out)
+        written(False)
+        exchange(folder, folder.parent / INTERRUPTED if is_beside else folder.parent, shown)
+        state = f"; {UNCHANGED}" if is_beside else ""
+        interrupt.on_interrupt(f"the experiments that were finished are in {shown / 'index.html'}{state}")
+
+    interrupt.at_end.callback(write_finished)
     with start_workers() as workers, terminal.progress("imports"):
-        for modules in (DRAWING, COMPUTING)[: 1 if is_alone else 2]:  # in further processes at the same time
-            workers.submit(load_modules, *modules)
+        for module in (DRAWING, COMPUTING)[: 1 if is_alone else 2]:  # in further processes at the same time
+            workers.submit(importlib.import_module, module)
         from ..report.provenance import durations, provenance
         from . import examine
 
@@ -83,9 +110,8 @@ def compute(
         for name, reason in reasons.items():
             terminal.say(block("run", "skipped", name=name, reason=reason))
         terminal.how_far = partial(examine.progress, workers.clock, names)
-        examined = examine.Run(names, setup, folder, terminal, workers, workers.clock).examined()
-    origin |= {"seconds": round(time.perf_counter() - started, 1)} | durations(workers.clock)
-    return write_report(folder, examined, reasons, origin, compared)
+        run = examine.Run(names, setup, folder, terminal, workers, workers.clock)
+        return written()
 
 
 def applying(
@@ -97,16 +123,27 @@ def applying(
 
 
 def write_report(
-    folder: Path, examined: "Examined", reasons: dict[str, str], origin: dict[str, Any], compared: Compared
-) -> Written:
-    """Write a report with its verdict to a folder that has its figures; what could not be made of it."""
+    folder: Path, examined: "Examined", reasons: dict[str, str], origin: dict[str, Any], compared: Compared,
+    interrupted: Sequence[str] = (),
+) -> "Report":  # fmt: skip
+    """Write a report with its verdict to a folder that has its figures.
+
+    interrupted: the names of all experiments of a run that was ended, of which some are finished.
+    """
     from ..report import files, verdict
 
-    parts, (reference, robot, *_) = verdict.Parts(), compared
     sections, causes, needless = examined
+    reference, robot, *_ = compared
     count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
-    about = sections, count, causes, subject, robot.name
-    words = parts.attempt("the verdict", "No verdict.", verdict.verdict, *about)
-    left_out, named = list((reasons | needless).items()), {"kind": reference.kind, "name": reference.name}
-    report = verdict.Report(sections, robot, origin, words, causes, left_out, named, reference.lines)
-    return report, files.write(folder, report, parts)
+    words = verdict.verdict(sections, count, causes, subject, robot.name)
+    left_out = reasons | needless
+    if interrupted:
+        names = [section.name for section in sections]
+        numbers = {"finished": len(names), "experiments": len(interrupted)}
+        words = f"{block('verdict', 'interrupted', **numbers)}\n{words}"
+        left_out |= {name: block("run", "interrupted") for name in interrupted if name not in names}
+    named = {"kind": reference.kind, "name": reference.name}
+    about = words, causes, list(left_out.items()), named, reference.lines, not interrupted
+    report = verdict.Report(sections, robot, origin, *about)
+    files.write(folder, report)
+    return report

@@ -1,5 +1,6 @@
 """Runs the experiments one after the other; long work and drawing go to other processes."""
 
+import importlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
@@ -15,13 +16,12 @@ from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
-from ..process.workers import Clock, WorkerEnded, Workers, give_back_memory, load_modules
+from ..process.workers import Clock, Current, WorkerEnded, Workers, give_back_memory
 from ..report.terminal import Terminal
 from ..report.verdict import Figure, Section, failures
 from ..robots import Robot
 from ..robots.states import MOST_SPEEDS
 from .drawing import draw, quiet, results_needed
-from .explained import explained
 from .reference import Compared
 
 Value = TypeVar("Value")
@@ -70,7 +70,7 @@ class Run:
     folder: Path  # for the folder of figures
     terminal: Terminal
     workers: Executor | Workers
-    clock: Clock = field(default_factory=Clock)
+    clock: Clock = field(default_factory=lambda: Current.clock)
     sections: list[Section] = field(default_factory=list)
     causes: list[Cause] = field(default_factory=list)
     work: dict[str, Any] = field(default_factory=dict)  # that was begun, of each experiment
@@ -104,6 +104,19 @@ class Run:
         self.finish_drawings()
         sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
         return Examined(sections, self.causes, needless)
+
+    def finished(self) -> Examined:
+        """What is finished after an interrupt, without the figures that were not drawn."""
+        names = [name for name in self.names if name in self.clock.ended]
+        for section, drawing in self.drawings:
+            if drawing.done() and not drawing.exception():
+                section.figures = drawing.result()
+        sections = [section for name in names for section in self.sections if section.name == name]
+        drawn = {figure.path for section in sections for figure in section.figures}
+        for path in (self.folder / "figures").iterdir():
+            if path.name not in drawn:  # perhaps a part of a file
+                path.unlink()
+        return Examined(sections, self.causes, {})
 
     def attempt(self, name: str, act: Callable[..., Value], *arguments: Any) -> Value | None:
         """act(*arguments); if it raises, None, and the experiment has crashed."""
@@ -146,8 +159,6 @@ class Run:
                 add_problems(section.result, self.setup.own.equations.problems, self.told)
             new = new_causes(self.setup, self.sections, self.causes)
             self.causes = new + self.causes
-            if self.causes:
-                section.explained = self.attempt("explained", explained, self.setup, section) or []
         self.clock.ends(name)
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
@@ -179,7 +190,7 @@ class Run:
                 self.draw(section)
         with self.clock.of(END):
             self.setup.progress("figures")
-            load_modules("compare.report.files")  # it takes long; meanwhile workers draw
+            importlib.import_module("compare.report.files")  # it takes long; meanwhile workers draw
             for section, drawing in self.drawings:
                 try:
                     section.figures = drawing.result()
@@ -274,18 +285,19 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 def say_outcome(
     terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
 ) -> None:
-    """A line for an experiment, then new causes, and the first failing checks that no known one explains."""
+    """A line for an experiment, then new causes, and the first failing checks: one where a cause is known."""
     used = [check.over_tolerance or 0.0 for check in section.result.checks]
     not_judged = failures([section]).not_judged
     about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}
     style = "red" if section.failed else "yellow" if not_judged else ""
     terminal.say(block("run", "outcome", section=section, **about), style)
     lines = [f"CAUSE {cause.text}" for cause in new]
+    most = len(lines) + 1 if known else SHOWN
     if not (known and section.record.states_causes):  # there the causes are the checks
-        lines += [f"FAIL {check}" for check in section.failed if check not in section.explained]
+        lines += [f"FAIL {check}" for check in section.failed]
     lines += map(str, not_judged)
-    if len(lines) > SHOWN:
-        lines[SHOWN:] = [block("run", "more", count=len(lines) - SHOWN)]
+    if len(lines) > most + 1:
+        lines[most:] = [block("run", "more", count=len(lines) - most)]
     for line in lines:
         terminal.say(f"  {line}", "red")
 

@@ -213,7 +213,7 @@ def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None)
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
     try:
         stated = joint_map(coordinates, joints.split(",")) if joints else None
-        with aside(), raised_in(reference.rstrip(":")):
+        with aside(reference.rstrip(":")), raised_in(reference.rstrip(":")):
             equations = OwnEquations(source, coordinates, stated, robot.tree)
             equations.try_at(q, *rng.uniform(-1.0, 1.0, (2, len(q), coordinates.nv)))
     except JointsError as error:

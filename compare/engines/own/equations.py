@@ -3,7 +3,7 @@
 import time
 import warnings
 from collections.abc import Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 import numpy as np
 from numpy import ndarray
@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike
 import tmt
 from tmt.derivation import method
 
-from ...process.interrupt import is_interrupt
+from ...process.interrupt import Now, is_interrupt
 from ...robots.coordinates import Coordinates
 from ...robots.joint_map import JointMap, JointsError, joint_map
 from .. import rows_of_states
 from . import functions
 from .functions import QUANTITIES, STATE, OwnError, Problem, call, state_in_words
+from .own_file import aside
 
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
@@ -200,7 +201,8 @@ class OwnEquations:
         """The value of a function at one state, or at count of them; OwnError if it is none."""
         copies = [np.array(part) for part in states]
         try:
-            value = self.functions[name](*copies)
+            with aside(f"your {name}") if Now.is_listening else nullcontext():
+                value = self.functions[name](*copies)
         except BaseException as error:  # whatever a user's own function does
             if is_interrupt(error):
                 raise

@@ -11,15 +11,17 @@ import importlib.util
 import inspect
 import os
 import sys
+import time
 import traceback
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
 from ...core.errors import described
 from ...core.words import listed
-from ...process.interrupt import is_interrupt
+from ...process.interrupt import Now, is_interrupt
+from ...process.streams import Capped
 from .functions import OwnError
 
 FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
@@ -35,7 +37,7 @@ def own_object(stated: str) -> object:
     folder = os.path.dirname(os.path.realpath(place)) if is_file else os.getcwd()
     sys.path.append(folder)  # last: no file in it shadows a package
     try:
-        with aside(), raised_in(place):
+        with aside(place), raised_in(place):
             value = part_of(module_of_file(place) if is_file else module_named(place), place, name)
             return value() if inspect.isclass(value) else value
     finally:
@@ -114,11 +116,15 @@ def raised_in(place: str) -> Iterator[None]:
 
 
 @contextmanager
-def aside() -> Iterator[None]:
-    """A user's code in this block writes no compiled files, and prints to stderr."""
+def aside(name: str) -> Iterator[None]:
+    """A user's code in this block writes no compiled files, and prints to stderr, not without end.
+
+    name: what is waited for meanwhile.
+    """
     before, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    waited, Now.waits = Now.waits, (name, time.monotonic())
     try:
-        with redirect_stdout(sys.stderr):
+        with redirect_stdout(Capped()), redirect_stderr(Capped()):
             yield
     finally:
-        sys.dont_write_bytecode = before
+        sys.dont_write_bytecode, Now.waits = before, waited
