@@ -36,11 +36,13 @@ def in_child(run: Callable[[], int]) -> int:
     asked, until = 0, inf
     while "end" not in told and time.monotonic() < until:
         ready = connection.wait([ours, child.sentinel], interrupt.POLL)
-        if ours in ready:
-            with suppress(EOFError):
-                kind, text = ours.recv()
-                told[kind] = text
-        elif ready:
+        try:
+            if ours in ready:
+                kind, what = ours.recv()
+                told[kind] = what
+            elif ready:
+                break
+        except (EOFError, OSError):
             break
         if interrupt.Now.asked > asked:
             child.terminate()  # it hears that as Ctrl-C

@@ -143,7 +143,7 @@ def test_whatever_is_raised_is_one_line_and_ctrl_c_interrupts(raised, listening,
     def mass_matrix(q):
         raise raised("no")
 
-    monkeypatch.setattr(Now, "listening", listening)
+    monkeypatch.setattr(Now, "is_listening", listening)
     is_interrupt = raised is KeyboardInterrupt and not listening
     with pytest.raises(KeyboardInterrupt if is_interrupt else OwnError, match="no"):
         of_one("mass_matrix", mass_matrix).mass_matrix(states(rng)[0])

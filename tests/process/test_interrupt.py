@@ -1,5 +1,6 @@
 """Ctrl-C, SIGTERM and SIGHUP end a run within a second, in one line, with status 2, whatever it is doing."""
 
+import json
 import os
 import signal
 import subprocess
@@ -7,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+import psutil
 import pytest
 from own_equations import XML
 from runs import ENVIRONMENT, SECOND, command, compare, ended, posix, started
@@ -15,20 +17,25 @@ from compare.__main__ import main
 
 ROLLOUT = """
 import numpy as np
-from compare.engines.mujoco import parse
-from compare.robots.arm import ARM
+from compare.process import interrupt
 
-dynamics = parse(ARM.mjcf, ARM.tree).of(ARM.case())
-stepper = dynamics.stepper(1e-4, "RK4")
-run = stepper.loop(stepper.start(), 500_000)
-print("now", flush=True)
-run()  # some seconds in C
+def run():
+    from compare.engines.mujoco import parse
+    from compare.robots.arm import ARM
+    dynamics = parse(ARM.mjcf, ARM.tree).of(ARM.case())
+    stepper = dynamics.stepper(1e-4, "RK4")
+    run = stepper.loop(stepper.start(), 500_000)
+    print("now", flush=True)
+    run()  # some seconds in C
+    return 0
+
+interrupt.listen()
+interrupt.leave(interrupt.answered(run))
 """
-LISTENING = "from compare.process import interrupt; interrupt.listen()\n"
 TESTS = Path(__file__).parents[1]
 ALL = command("all", "--quick", "--out", "report")
 OWN = [*ALL, "--reference", f"{TESTS / 'own_equations.py'}:", "--mjcf", "../double.xml"]
-ROLLING = [sys.executable, "-c", LISTENING + ROLLOUT]
+ROLLING = [sys.executable, "-c", ROLLOUT]
 RUNS = {  # what runs, and what it is sent: as it begins, or after its first line
     "workers start": (ALL, "SIGTERM"), "a line": (ALL, "SIGHUP"), "own equations": (OWN, "SIGINT"),
     "a rollout": (ROLLING, "SIGINT"),
@@ -48,31 +55,98 @@ def test_an_interrupt_is_answered_within_a_second(tmp_path, name):
             run.stdout.readline()
         assert run.poll() is None
         end = ended(run, name_of_signal)
-        assert end.status == 2 and len(end.lines) == 1 and "Traceback" not in end.lines[0]
-        assert list(place.iterdir()) == []
+        assert end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0]
+        assert list(place.iterdir()) == [] and "earlier" not in end.lines[0]
         if end.seconds < SECOND:
             return
     raise AssertionError(f"answered after {end.seconds:.2f} s")
 
 
-LEAVING = """
-import os
-from own_equations import mass_matrix
+@pytest.mark.parametrize("is_earlier", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_what_is_finished_is_reported_beside_an_earlier_report(tmp_path, is_earlier):
+    (tmp_path / "report").mkdir()
+    earlier, place = tmp_path / "report" / "results.json", tmp_path / "report"
+    if is_earlier:
+        earlier.write_text('{"provenance": {"files": ["results.json"]}}')
+        place = place / "interrupted"
+    run = started(*ALL, cwd=tmp_path)
+    while not run.stdout.readline().startswith("mass "):
+        assert run.poll() is None
+    end = ended(run, "SIGINT")
+    assert end.status == 2 and f"{place.relative_to(tmp_path)}/index.html" in end.lines[0]
+    assert ("earlier" in end.lines[0]) == is_earlier and (len(earlier.read_text()) < 100) == is_earlier
+    results = json.loads((place / "results.json").read_text())
+    finished = {check["experiment"] for check in results["checks"]}
+    left_out = {skipped["experiment"] for skipped in results["skipped"]}
+    assert {"kinematics", "mass"} <= finished and not results["passed"]
+    assert "speed" in left_out and not left_out & finished
+    assert "**Interrupted: " in (place / "report.md").read_text()
+
+
+OWN_FILE = """
+import os, signal, subprocess, sys, time
+from own_equations import acceleration, bias as right, mass_matrix
+
+how, calls = {how!r}, 0
+os.chdir("elsewhere")
+if how == "child":
+    child = subprocess.Popen(["bash", "-c", "trap '' TERM; while true; do sleep 0.1; done"])
+    open("child", "w").write(str(child.pid))
+if how == "import":
+    os._exit(200)
+
 
 def bias(q, qd):
-    os._exit(0) if leaving else os.kill(os.getpid(), 9)
+    global calls
+    calls += 1
+    if calls == 300 and how in ACTS:
+        ACTS[how]()
+    if how == "child":
+        print("x" * 10_000)
+        sys.stderr.write("y" * 10_000)
+    return right(q, qd)
+
+
+ACTS = {{"call": lambda: os._exit(200), "killed": lambda: os.kill(os.getpid(), 9),
+        "hangs": lambda: time.sleep(600)}}
 """
+ENDS = {"import": "exit status 200", "call": "exit status 200", "killed": "killed by SIGKILL"}
+
+
+def of_own(how, folder, **more):
+    (folder / "elsewhere").mkdir()
+    (folder / "double.xml").write_text(XML)
+    (folder / "mine.py").write_text(OWN_FILE.format(how=how))
+    asked = "acceleration", "--quick", "--mjcf", "double.xml", "--reference", "mine.py:", "--out", "report"
+    path = os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(TESTS)])
+    return asked, {"cwd": folder, "env": {"PYTHONPATH": path}}
 
 
 @posix
-@pytest.mark.parametrize("leaving, how", [(True, "exit status 0"), (False, "killed by SIGKILL")])
-def test_own_equations_that_end_the_process_are_seen(tmp_path, leaving, how):
-    (tmp_path / "double.xml").write_text(XML)
-    (tmp_path / "mine.py").write_text(f"leaving = {leaving}{LEAVING}")
-    path = os.pathsep.join([ENVIRONMENT["PYTHONPATH"], str(TESTS)])
-    asked = "mass", "--quick", "--mjcf", "double.xml", "--reference", "mine.py:"
-    run = compare(*asked, cwd=tmp_path, env={"PYTHONPATH": path})
-    assert (run.returncode, run.stdout, len(run.stderr.splitlines())) == (2, "", 1) and how in run.stderr
+@pytest.mark.parametrize("how", ENDS)
+def test_own_equations_that_end_the_process_are_seen_and_leave_nothing(tmp_path, how):
+    asked, where = of_own(how, tmp_path)
+    run = compare(*asked, **where)
+    assert (run.returncode, len(run.stderr.splitlines())) == (2, 1) and ENDS[how] in run.stderr
+    assert "passed" not in run.stdout and not (tmp_path / "report").exists()
+
+
+@posix
+def test_own_equations_may_change_the_folder_print_much_and_start_what_ends_with_the_run(tmp_path):
+    asked, where = of_own("child", tmp_path)
+    run = compare(*asked, **where)
+    assert run.returncode == 0 and (tmp_path / "report" / "index.html").exists()
+    assert len(run.stderr) < 21_000 and "no more is shown" in run.stderr and "xxx" not in run.stdout
+    child = int((tmp_path / "elsewhere" / "child").read_text())
+    assert not psutil.pid_exists(child) or psutil.Process(child).status() == psutil.STATUS_ZOMBIE
+
+
+def test_own_equations_that_hang_are_named(tmp_path):
+    asked, where = of_own("hangs", tmp_path)
+    run = started(*command(*asked), **where)
+    assert "waiting for your bias, 10 s" in run.stderr.readline()
+    end = ended(run, "SIGINT")
+    assert end.status == 2 and "waiting for your bias" in end.lines[-1] and not (tmp_path / "report").exists()
 
 
 @pytest.mark.slow
@@ -86,10 +160,11 @@ def test_the_processes_of_a_run_that_is_killed_end_with_it(tmp_path):
 
 @posix
 def test_a_signal_that_is_ignored_stays_ignored():
-    text = LISTENING + "import os, signal; os.kill(os.getpid(), signal.SIGINT); print('well')"
+    text = "from compare.process import interrupt; interrupt.listen()\n"
+    text += "import os, signal; os.kill(os.getpid(), signal.SIGINT); print(interrupt.Now.asked)"
     line = ["bash", "-c", "trap '' INT; exec \"$@\"", "-", sys.executable, "-c", text]
     run = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True)
-    assert (run.returncode, run.stdout, run.stderr) == (0, "well\n", "")
+    assert (run.returncode, run.stdout, run.stderr) == (0, "0\n", "")
 
 
 def test_called_from_python_the_command_line_leaves_signals_alone():

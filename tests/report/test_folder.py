@@ -1,6 +1,7 @@
 """A report takes the old one's place when it is complete, and nothing else is touched."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -53,77 +54,61 @@ def test_a_new_report_replaces_the_old_one_and_keeps_other_files(tmp_path):
     assert names_in(out) == {"my notes.txt", "results.json", "tables"}
 
 
-def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch):
+@pytest.mark.parametrize("at", range(4))  # two are moved away, two moved in
+def test_an_exchange_that_fails_puts_everything_back(tmp_path, monkeypatch, at):
     old_report(tmp_path)
-    rename = type(tmp_path).rename
+    replace, moved = os.replace, []
 
     def stubborn(source, target):
-        if source.parent.name == "moving" and source.name == "tables":
+        if len(moved) == at:
+            moved.append(None)
             raise PermissionError(13, "Permission denied")
-        return rename(source, target)
+        moved.append(source)
+        return replace(source, target)
 
-    with pytest.raises(Refused), new_report(tmp_path) as work:
+    with pytest.raises(Refused, match="the earlier report is unchanged"), new_report(tmp_path) as work:
         fill(work, "new")
-        monkeypatch.setattr(type(tmp_path), "rename", stubborn)
+        monkeypatch.setattr(os, "replace", stubborn)
     monkeypatch.undo()
     assert files(tmp_path) == OLD and names_in(tmp_path) == {"results.json", "tables"}
 
 
+def test_without_an_earlier_report_none_is_said_to_be_there(tmp_path):
+    with pytest.raises(Refused) as error, new_report(tmp_path / "out") as work:
+        raise OSError(28, "No space left", str(work / "report.md"))
+    assert str(error.value) == f"cannot write {tmp_path / 'out' / 'report.md'}: No space left"
+    assert names_in(tmp_path) == set()
+
+
 RUN = f"""
-import json, os, sys
-from compare.process import interrupt
-from compare.core.errors import Refused
+import json, os, signal, sys
 from compare.report.folder import new_report
 
 {getsource(fill)}
-out, number, at = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
-renamed = 0
-
-
-def hook(event, _):
-    global renamed
-    if event == "os.rename":
-        if renamed == at:
-            os.kill(os.getpid(), number)
-        renamed += 1
-
-
-interrupt.listen()
-with new_report(out) as work:
+with new_report(sys.argv[1]) as work:
     fill(work, "new")
-    (work / "report.md").write_text("new")
-    sys.addaudithook(hook)
-print(renamed)
+    os.kill(os.getpid(), signal.SIGKILL)
 """
-NEW = {"tables/mass.csv": "new", "results.json": "new", "report.md": "new"}
-
-
-def run(out, number=0, at=-1):
-    command = [sys.executable, "-c", RUN, str(out), str(int(number)), str(at)]
-    return subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True)
 
 
 @posix
-def test_after_kill_9_in_the_exchange_the_next_run_finds_the_old_report_whole(tmp_path):
-    for at in range(20):
-        out = tmp_path / str(at)
-        old_report(out)
-        if run(out, signal.SIGKILL, at).returncode == 0:  # after its last rename
-            assert files(out) == NEW
-            break
-        with pytest.raises(RuntimeError), new_report(out):
-            raise RuntimeError  # a run that does not end well: what changes is what the killed one has left
-        assert files(out) == OLD and names_in(out) == {"results.json", "tables"}
-        with new_report(out) as work:
-            fill(work, "third")
-        assert files(out) == {"tables/mass.csv": "third", "results.json": "third"}
-    assert at == 7  # three moved in, two names of a folder changed, and what was moved away
+def test_after_kill_9_the_old_report_is_whole_and_the_next_run_clears_up(tmp_path):
+    old_report(tmp_path)
+    run = subprocess.run([sys.executable, "-c", RUN, str(tmp_path)], env=ENVIRONMENT)
+    assert run.returncode == -signal.SIGKILL and len(names_in(tmp_path)) == 3
+    with pytest.raises(RuntimeError), new_report(tmp_path) as other:
+        with new_report(tmp_path) as work:  # of a run at the same time, which clears nothing of this one
+            fill(work, "new")
+        assert other.is_dir()
+        raise RuntimeError
+    assert files(tmp_path) == OLD | {"tables/mass.csv": "new", "results.json": "new"}
+    assert names_in(tmp_path) == {"results.json", "tables"}
 
 
 def test_only_what_a_run_has_left_is_cleared(tmp_path):
     names = ".new-a1b2c3_d", ".new-a1b2c3_e/mine", ".new-ideas/report.md"
     left, *kept = (tmp_path / name for name in names)
-    (left / "new" / "tables").mkdir(parents=True)
+    (left / "tables").mkdir(parents=True)
     for path in kept:
         path.mkdir(parents=True)
     old_report(tmp_path)

@@ -41,8 +41,7 @@ def report_of_arm(small, folder) -> str:
         others = drawing.results_needed(name, NAMES, sections)
         section.figures = drawing.draw(name, section.result, ARM, folder, others)
     report = verdict.Report(sections, ARM, {"command": "a small run"}, verdict.verdict(sections, len(NAMES)))
-    document = Document(report, verdict.Parts())
-    return document.text(document.body())
+    return Document(report).text()
 
 
 def test_the_words_of_a_small_report(small, tmp_path, monkeypatch):

@@ -14,8 +14,7 @@ from compare.core.cause import Cause
 from compare.report import images, provenance
 from compare.report.document import Document
 from compare.report.files import write
-from compare.report.verdict import OVERVIEW, Figure, Parts, Report, verdict
-from compare.robots import Question
+from compare.report.verdict import OVERVIEW, Figure, Report, verdict
 from compare.robots.arm import ARM
 
 CAUSE = Cause(rank=2, place="mass of forearm", stated=1.5, explains=1.6, text="forearm: 1.6 kg")
@@ -37,8 +36,8 @@ def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
 
 def page_of(folder, sections, causes=(), skipped=()):
     """The first screen of a page of these sections, and what comes below it."""
-    document = Document(report_of(folder, sections, causes, skipped), Parts(), folder)
-    top, mark, rest = document.text(document.body()).partition("<section")
+    document = Document(report_of(folder, sections, causes, skipped), folder)
+    top, mark, rest = document.text().partition("<section")
     return top, mark + rest
 
 
@@ -101,7 +100,6 @@ def test_results_have_every_check_cause_and_digit(folder):
     names = ("joint;" * 20)[:81]
     extra = [{"b": 1 / 3, "names": names}]
     of = section("mass", GOOD, BAD, rows=rows, figures=["mass_distances"], extra=extra)
-    of.explained = of.result.checks[1:]
     write(folder, report_of(folder, [of], [CAUSE]))
     results = json.loads(text_of(folder / "results.json"))
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
@@ -111,33 +109,8 @@ def test_results_have_every_check_cause_and_digit(folder):
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
     assert names not in text and CAUSE.text in html and CAUSE.text in text
-    assert html.count("<td>0.123</td>") == 3 and "The cause explains 1 failing check" in text
+    assert html.count("<td>0.123</td>") == 3
     assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]
-
-
-def test_a_part_that_breaks_is_named_in_all_files_and_the_others_stay(folder):
-    """A report of which the questions, a table, a cause and sections cannot be made."""
-    asks = replace(ARM, questions=(Question("a", "what", "mass", ("largest", "mass", "Mbar", None)),))
-    other = {"quantity": "Mbar", "scene": "zero", "unit": "kg m2", "largest_difference": "far"}
-    rows = {"mass": other, "gravity": {"a": 1.5}, "speed": {}}
-    sections = [section(name, GOOD, rows=[row]) for name, row in rows.items()]
-    report = report_of(folder, sections, [replace(CAUSE, explains=float("nan")), CAUSE], robot=asks)
-    sections[1].figures = [Figure("nowhere", "A caption.")]
-    sections[2].result.rows = [3]
-    parts = write(folder, report)
-    whys = {
-        "tables/speed.csv": "AttributeError", "cause 1 in results.json": "ValueError", "the questions": "TypeError",
-        "speed in report.md": "AttributeError", "gravity in index.html": "FileNotFoundError",
-        "speed in index.html": "AttributeError",
-    }  # fmt: skip
-    assert {name: why.split(":")[0] for name, why in parts.broken.items()} == whys
-    text, html = text_of(folder / "report.md"), text_of(folder / "index.html")
-    assert all(name in text and name in html for name in whys) and '<div class="verdict bad">' in html
-    assert sorted(path.name for path in (folder / "tables").iterdir()) == ["gravity.csv", "mass.csv"]
-    results = json.loads(text_of(folder / "results.json"))
-    failed = [check for check in results["checks"] if not check["passed"]]
-    assert results["passed"] is False and {check["experiment"] for check in failed} == {"report"}
-    assert len(failed) == len(whys) and len(results["causes"]) == 1
 
 
 def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import os
 import random
 import re
 import shutil
-from dataclasses import dataclass, make_dataclass
+from dataclasses import dataclass, make_dataclass, replace
 
 import pytest
 from in_process import without_workers
@@ -25,7 +25,7 @@ from compare.experiments import EXPERIMENTS
 from compare.report import files, style, tables
 from compare.report.document import Document
 from compare.report.terminal import Terminal
-from compare.report.verdict import Parts, Report
+from compare.report.verdict import Report
 from compare.robots.arm import ARM
 
 
@@ -57,8 +57,7 @@ def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
 
 
 def text_of(*sections):
-    document = Document(Report(sections, ARM, {"command": "c"}, "Worst in <i>.", (), ()), Parts())
-    return document.text(document.body())
+    return Document(Report(sections, replace(ARM, questions=()), {"command": "c"}, "Worst in <i>.", (), ())).text()
 
 
 def test_report_md_is_short_whatever_there_is_to_say():
