@@ -3,6 +3,7 @@
 import dataclasses
 import doctest
 import inspect
+import json
 import re
 import shutil
 import subprocess
@@ -19,12 +20,14 @@ from compare.agreement import Difference
 EXAMPLES = sorted((ROOT / "tests" / "examples").glob("*.py"))
 SLOW = {"many_files": pytest.mark.slow}  # which starts runs
 TABLE = ROOT / "reports" / "example" / "tables" / "speed.csv"
+GIVEN = {"time_against_error": [TABLE], "marks": ["class"]}
 # what is printed, and the files that are left
 EXPECTED = {
     "controller": (r"after 2 s: 0\.00\d* deg", set()),
     "exported_c": (r"difference from tmt: \d(\.\d)?e-1\d|difference from tmt: 0$", {"arm.c", "arm.h", "arm.so"}),
     "many_files": (r"status 1.*\n.*ben.xml: differ com z of rod.*\n.*anna.xml: agree$",
                    {"class", "solution.xml", "submissions"}),
+    "marks": (r"anna.xml: 7 of 7\nben.xml: 3 of 7\ncopy.xml: 7 of 7\nbroken.xml: 0 of 7$", {"class"}),
     "own_equations": (r"equations agree; .* h\[pole\] is .*\nprobable cause: gravity has the other sign in your h", set()),
     "stable_step": (r"Euler: 0\.00\d+ s, elbow; .* not stable\n.*fast: 0\.0[56]\d+ s(.*\n)+.* elbow 8\.0: 0\.002", set()),
     "time_against_error": ("6 methods", {"time_against_error.png"}),
@@ -32,11 +35,25 @@ EXPECTED = {
 CASES = [pytest.param(path, marks=SLOW.get(path.stem, ()), id=path.stem) for path in EXAMPLES]
 
 
+def write_fleet(folder):
+    """A fleet whose second file has one number that differs, and a mass matrix and a bias that pass and fail."""
+    checks = ("parameters", "com", True), ("parameters", "mass", True), ("mass", "Mbar", True), ("gravity", "torque", True)
+    for name, passes in {"anna.xml": True, "ben.xml": False}.items():
+        found = [*checks[:1], ("parameters", "mass", passes), *checks[2:], ("mass", "other", passes)]
+        fields = [dict(zip(("experiment", "quantity", "passed"), check)) for check in found]
+        (folder / "files" / name).mkdir(parents=True)
+        (folder / "files" / name / "results.json").write_text(json.dumps({"checks": fields}))
+    files = "anna.xml,", "ben.xml,", "copy.xml,anna.xml", "broken.xml,"
+    (folder / "fleet.csv").write_text("\n".join(["file,same_as", *files]))
+
+
 @pytest.mark.parametrize("path", CASES)
 def test_an_example_runs_and_says_what_it_finds(path, tmp_path):
     if path.stem == "exported_c" and not shutil.which("gcc"):
         pytest.skip("needs gcc")
-    words = [sys.executable, path, *[TABLE] * (path.stem == "time_against_error")]
+    words = [sys.executable, path, *GIVEN.get(path.stem, ())]
+    if path.stem == "marks":
+        write_fleet(tmp_path / "class")
     run = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
     printed, left = EXPECTED[path.stem]
     assert run.returncode == 0 and run.stderr == ""

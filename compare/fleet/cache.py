@@ -1,18 +1,17 @@
-"""The folder of a fleet: a report for each file, its row of the table and the key of all they depend on."""
+"""The folder of a fleet: a report for each file, beside it its row and the key of all that they depend on."""
 
 import hashlib
 import json
-import shutil
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from ..core.errors import ROOT, Refused
 from ..process import interrupt
 from ..report import folder
 from ..report.provenance import installed
-from .models import unpacked
 
 FILES = "files"
 MARK = ".fleet"  # file in a report: key and row
@@ -50,28 +49,29 @@ def locked(out: Path) -> Iterator[None]:
 
 
 def saved(place: Path, key: str) -> object:
-    """What was saved in a folder of a report as its row, if it depends on the same things, else None."""
+    """What was saved as the row of a report, if it depends on the same things and the report is whole."""
     with suppress(Exception):  # whatever lies there, it is data
-        saved_key, row = json.loads((place / MARK).read_bytes())
-        return row if saved_key == key else None
+        saved_key, files, row = json.loads((place / MARK).read_bytes())
+        return row if saved_key == key and files == hashes(place) else None
     return None
 
 
-def write_whole(path: Path, content: bytes | dict[str, bytes]) -> None:
-    """Replace a file, or a folder of files {path: content}, in one step. Refused if that fails."""
+def save(place: Path, key: str, row: dict[str, Any]) -> None:
+    place.mkdir(parents=True, exist_ok=True)
+    write_whole(place / MARK, json.dumps((key, hashes(place), row)))
+
+
+def hashes(place: Path) -> dict[str, str]:
+    """The files of a report, each with a hash of its content."""
+    return {name: hashlib.sha256((place / name).read_bytes()).hexdigest() for name in folder.files(place)}
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Replace a file in one step. Refused if that fails."""
     part = path.with_name(f".{path.name}.part")
     try:
-        if isinstance(content, bytes):
-            part.write_bytes(content)
-        else:
-            shutil.rmtree(part, ignore_errors=True)
-            unpacked(content, part)
-        with interrupt.undivided():
-            if path.is_dir():
-                shutil.rmtree(path)
-            part.replace(path)
+        part.write_text(text, encoding="utf-8", errors="backslashreplace")
+        part.replace(path)
     except OSError as error:
-        shutil.rmtree(part, ignore_errors=True)
-        with suppress(OSError):
-            part.unlink()
+        part.unlink(missing_ok=True)
         raise Refused(f"cannot write {path}: {error.strerror}; {RESUME}") from None

@@ -22,11 +22,8 @@ from ..report.terminal import Terminal
 
 if TYPE_CHECKING:
     from .executors import Executor
+    from .models import Model
     from .table import FileRow
-
-SENT = "reference of the fleet"  # folder of the solution in a bundle
-TIMING = "timing"  # resource of Dask's workers on which nothing else runs
-PERIOD = 10.0  # s between two lines of the progress where it cannot be shown
 
 
 def fleet_reference(text: str) -> str:
@@ -39,14 +36,11 @@ def fleet_reference(text: str) -> str:
 FLEET_OPTIONS = {
     "--out": Option(metavar="DIR", default=f"reports/{FLEET}"),
     "--full": Option(None),
-    "--timing": Option(None),
     "--reference": Option(fleet_reference, "WHAT"),
     "--only": Option(metavar="LIST"),
     "--workers": Option(cli.process_count, "N"),
     "--dask": Option(metavar="ADDRESS"),
     "--limit": Option(cli.seconds(1e6), "S", 1800.0),
-    "--since": Option(metavar="DIR"),
-    "--rubric": Option(metavar="FILE"),
 }
 
 
@@ -56,18 +50,19 @@ def fleet_parser() -> cli.Parser:
     return made
 
 
-def experiments_of(made: cli.Parser, only: str | None, timing: bool = False) -> tuple[str, ...]:
-    """The experiments of --only, in their order; None: all that may run."""
+def experiments_of(made: cli.Parser, only: str | None) -> tuple[str, ...]:
+    """The experiments of --only, in their order; None: all that measure no times."""
+    able = {name: name for name in EXPERIMENTS if name not in TIMED}
     if only is None:
-        return tuple(name for name in EXPERIMENTS if timing or name not in TIMED)
+        return tuple(able)
     names = only.replace(" ", "").split(",")
     for name in names:
-        if name not in EXPERIMENTS:
-            near = cli.expected(name, {known: known for known in EXPERIMENTS}, ", ".join(EXPERIMENTS))
+        if name in TIMED:
+            made.error(f"--only: {name} measures times, which a fleet does not: {PROGRAM} {name}")
+        if name not in able:
+            near = cli.expected(name, able, ", ".join(able))
             made.error(f"--only: {name!r} is not an experiment; {near}")
-        if name in TIMED and not timing:
-            made.error(f"--only: {name} measures time; add --timing")
-    return tuple(name for name in EXPERIMENTS if name in names)
+    return tuple(name for name in able if name in names)
 
 
 def fleet_status(arguments: Sequence[str]) -> int:
@@ -81,9 +76,9 @@ def fleet_status(arguments: Sequence[str]) -> int:
         raise SystemExit(0)
     if not options.paths:
         made.error(f"no PATH given; expected a file, a folder, a pattern or @LIST: {PROGRAM} {FLEET} models")
-    if options.workers and (options.dask or options.timing):
-        made.error("--workers cannot be combined with --dask or --timing")
-    names = experiments_of(made, options.only, options.timing)
+    if options.workers and options.dask:
+        made.error("--workers cannot be combined with --dask")
+    names = experiments_of(made, options.only)
     return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
 
@@ -92,32 +87,23 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     started = time.perf_counter()
     from .cache import locked  # imports are slow
     from .models import found_models
-    from .rubric import read_rubric
     from .run import Run
-    from .table import changes, earlier, write_table
+    from .table import write_table
     from .task import FleetOptions
 
     terminal, out = Terminal(), Path(options.out)
-    before = earlier(options.since) if options.since else None
-    rubric = read_rubric(options.rubric, names) if options.rubric else None
     models, left_out = found_models(options.paths)
-    sent = solution_files(options.reference)
-    file_options = FleetOptions(names, not options.full, options.reference, next(iter(sent), ""))
+    solution = solution_of(options.reference)
+    path = os.path.abspath(solution.path) if solution else ""
+    file_options = FleetOptions(names, not options.full, options.reference, path)
     with locked(out), closing(executor_of(options)) as executor:
-        run = Run(models, file_options, executor, out, sent)
+        run = Run(models, file_options, executor, out, solution)
         terminal.how_far = run.progress
-        with terminal.progress("", PERIOD):
+        with terminal.progress(""):
             run.carry_out(lambda rows: say_rows(terminal, rows))
-        changed, most = None if before is None else changes(before, run.rows), None
-        if rubric:
-            rubric.award(run.rows, out)
-            most = rubric.total
-        summary = write_table(out, run.rows, left_out, changed, command, most)
+        summary = write_table(out, run.rows, left_out, command)
     terminal.say()
     terminal.say_lines(summary, "bold green" if run.is_good else "bold red")
-    if changed is not None:
-        since = f"since {in_one_line(options.since)}: "
-        terminal.say_lines(since + line for line in changed or ["no changes"])
     page, seconds = in_one_line(os.path.join(options.out, "index.html")), time.perf_counter() - started
     terminal.say(f"Fleet: {page} ({seconds:.1f} s)")
     return 0 if run.is_good else 1
@@ -127,25 +113,25 @@ def executor_of(options: argparse.Namespace) -> "Executor":
     from .executors import Cluster, Pool  # imports are slow
 
     if options.dask:
-        return Cluster(options.dask, options.limit, TIMING if options.timing else None)
-    return Pool(1 if options.timing else options.workers or cores(), options.limit)
+        return Cluster(options.dask, options.limit)
+    return Pool(options.workers or cores(), options.limit)
 
 
-def solution_files(reference: str | None) -> dict[str, bytes]:
-    """The files of a reference that is a solution, itself first, else {}. Refused if they cannot be read."""
+def solution_of(reference: str | None) -> "Model | None":
+    """The reference of a fleet, if it is a solution. Refused if that cannot be read."""
     from ..engines.mujoco import ModelError, read  # imports are slow
     from ..process.parts import needed_by
     from ..run.reference import is_solution
-    from .models import Model, bundle
+    from .models import Model
 
     if not reference or not is_solution(reference):
-        return {}
+        return None
     path = Path(reference)
     try:
         read(path)
     except ModelError as error:
         raise Refused(f"--reference: {error}") from None
-    return {f"{SENT}/{name}": content for name, content in bundle(Model(path, needed_by(path))).items()}
+    return Model(path, needed_by(path))
 
 
 def say_rows(terminal: Terminal, rows: Sequence["FileRow"]) -> None:

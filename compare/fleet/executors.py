@@ -112,12 +112,9 @@ def alone(function: Callable[..., T], arguments: Arguments, folder: str, memory:
 
 
 class Cluster:
-    """The workers of a Dask scheduler. Refused: no scheduler, or no worker.
+    """The workers of a Dask scheduler, on the same files. Refused: no scheduler, or no worker."""
 
-    resource: of the workers, 1 of which a call needs; None: a thread.
-    """
-
-    def __init__(self, address: str, limit: float, resource: str | None = None):
+    def __init__(self, address: str, limit: float):
         try:
             import distributed
         except ImportError:
@@ -125,7 +122,7 @@ class Cluster:
         for name in LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # errors are reported here, in one line
         warnings.filterwarnings("ignore", module="distributed")
-        self.address, self.limit, self.resource, self.answered = address, limit, resource, time.monotonic()
+        self.address, self.limit, self.answered = address, limit, time.monotonic()
         try:
             self.client = distributed.Client(address, timeout=CONNECTING, set_as_default=False, name="fleet")
         except Exception as error:
@@ -136,23 +133,19 @@ class Cluster:
         self.workers = self.threads_now()
         if not self.workers:
             self.close()
-            offers = f" with --resources {resource}=1" if resource else ""
-            raise Refused(f"the scheduler {address} has no worker{offers}")
+            raise Refused(f"the scheduler {address} has no worker")
 
     def threads_now(self) -> int:
         """Number of calls that the workers run at the same time; 0 without a connection."""
         with suppress(Exception):
             if self.client.status == "running":
                 workers = self.client.scheduler_info()["workers"].values()
-                if self.resource:
-                    return int(sum(worker["resources"].get(self.resource, 0) for worker in workers))
                 return sum(worker["nthreads"] for worker in workers)
         return 0
 
     def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]":
-        resources = {self.resource: 1} if self.resource else None
         call = on_worker, function, arguments, self.limit, program()
-        return cast("Future[Outcome[T]]", self.client.submit(*call, pure=False, resources=resources))
+        return cast("Future[Outcome[T]]", self.client.submit(*call, pure=False))
 
     def outcome(self, future: Any) -> Outcome[Any]:
         if future.status == "finished":

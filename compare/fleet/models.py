@@ -3,10 +3,10 @@
 A file that is no model is one of them too: the table says why it was refused.
 """
 
-import hashlib
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from glob import glob, has_magic
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,24 +22,15 @@ class Model(NamedTuple):
     parts: Sequence[Path]  # the file itself and the files that it includes or loads
 
     @property
+    def contents(self) -> list[tuple[str, str]]:
+        """The paths of the parts from the file's folder, and hashes of what is in them; the file first. OSError."""
+        names = [os.path.relpath(part, self.path.parent) for part in self.parts]
+        return [(name, sha256(part.read_bytes()).hexdigest()) for name, part in zip(names, self.parts)]
+
+    @property
     def shown(self) -> str:
         """The path as given, printable, with the same separators on every system."""
         return in_one_line(self.path.as_posix())
-
-
-def bundle(model: Model) -> dict[str, bytes]:
-    """The files of a model for another machine: {path below a common folder: content}, the model first."""
-    parts = [Path(os.path.abspath(part)) for part in model.parts]
-    top = os.path.commonpath([part.parent for part in parts])
-    return {Path(os.path.relpath(part, top)).as_posix(): part.read_bytes() for part in parts}
-
-
-def unpacked(files: dict[str, bytes], folder: Path) -> Path:
-    """Write the files of a bundle to a folder; the path of the model."""
-    for name, content in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    return folder / next(iter(files))
 
 
 def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str]]]:
@@ -117,5 +108,5 @@ def place_of_report(shown: str) -> str:
     parts = [part for part in path.parts if part not in (path.anchor, os.pardir)]
     if os.path.isabs(shown) or os.pardir in Path(shown).parts:
         # the shortened path may be that of another file
-        parts[-1] += f"-{hashlib.sha256(shown.encode()).hexdigest()[:8]}"
+        parts[-1] += f"-{sha256(shown.encode()).hexdigest()[:8]}"
     return "/".join(["files", *parts])

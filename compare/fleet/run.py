@@ -1,26 +1,26 @@
 """Run a fleet: submit the files whose reports are missing or old, write the report of each as it comes."""
 
 import hashlib
-import json
+import os
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from ..core.text import block
-from .cache import MARK, program, saved, write_whole
+from .cache import program, save, saved
 from .executors import Executor, Outcome
-from .models import Model, bundle, place_of_report
+from .models import Model, place_of_report
 from .table import BROKE, REFUSED, FileRow, row_of_data
-from .task import Compared, FleetOptions, compare_file
+from .task import FleetOptions, compare_file
 
-AHEAD = 2  # files that are submitted for each worker; they are in memory
+AHEAD = 2  # files that are submitted for each worker
 POLLING = 0.3  # s between two lines of progress
 
 
-Answer = Future[Outcome[Compared]]
+Answer = Future[Outcome[FileRow]]
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Run:
     options: FleetOptions
     executor: Executor
     out: Path
-    sent: Mapping[str, bytes]  # the files of a solution, added to the bundle of each model; see FleetOptions
+    solution: Model | None = None  # with which all are compared
     rows: list[FileRow] = field(default_factory=list)  # after carry_out one for each model
     first: dict[object, Model] = field(default_factory=dict)  # by the content of a model and its parts
     copies: list[tuple[Model, Model]] = field(default_factory=list)  # and the first model of the same content
@@ -61,35 +61,36 @@ class Run:
     def start(self, model: Model) -> None:
         """Submit a file, unless it is not readable, a copy, or its report is up to date."""
         try:
-            files = bundle(model) | dict(self.sent)
+            contents = model.contents
         except OSError as error:
             reason = block("fleet", "unreadable", why=error.strerror)
             self.rows.append(FileRow(file=model.shown, verdict=REFUSED, reason=reason))
             return
-        hashes = [(name, hashlib.sha256(content).hexdigest()) for name, content in files.items()]
-        (own_name, own_hash), *others = hashes
+        (own_name, own_hash), *others = contents
         first = self.first.setdefault((Path(own_name).with_stem("model"), own_hash, *others), model)
         if first is not model:
             self.copies.append((model, first))
             return
-        inputs = repr((program(), hashes, model.shown, self.options))
+        of_solution = self.solution.contents if self.solution else ()
+        inputs = repr((program(), contents, of_solution, model.shown, self.options))
         key = hashlib.sha256(inputs.encode("utf-8", "backslashreplace")).hexdigest()
-        if row := row_of_data(saved(self.out / place_of_report(model.shown), key)):
+        place = self.out / place_of_report(model.shown)
+        if row := row_of_data(saved(place, key)):
             self.rows.append(row)
             return
-        answer = self.executor.submit(compare_file, model.shown, self.options, files)
+        paths = os.path.abspath(model.path), os.path.abspath(place)
+        answer = self.executor.submit(compare_file, model.shown, *paths, self.options)
         self.under_way[answer] = model, key
         answer.add_done_callback(self.done.put)
 
     def receive(self, answer: Answer) -> None:
-        """A file is done: write its report."""
-        (model, key), (compared, why) = self.under_way.pop(answer), self.executor.outcome(answer)
-        if compared is None:
-            self.rows.append(FileRow(file=model.shown, verdict=BROKE, reason=why))
-            return
-        mark = json.dumps((key, asdict(compared.row))).encode()
-        write_whole(self.out / place_of_report(model.shown), compared.report | {MARK: mark})
-        self.rows.append(compared.row)
+        """A file is done: save its row beside its report."""
+        (model, key), (row, why) = self.under_way.pop(answer), self.executor.outcome(answer)
+        if row is None:
+            row = FileRow(file=model.shown, verdict=BROKE, reason=why)
+        else:
+            save(self.out / place_of_report(model.shown), key, asdict(row))
+        self.rows.append(row)
 
     def progress(self) -> list[str]:
         """How far the fleet is: "3 of 12 files", "1 differ", "2 agree"."""

@@ -1,24 +1,19 @@
 """The table of a fleet: rows, fleet.csv, index.html with its summary, changes since an earlier fleet."""
 
-import csv
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
-from io import StringIO
 from pathlib import Path
 from typing import get_type_hints
 from urllib.parse import quote
 
-from markupsafe import Markup
-
 from ..core.check import About
-from ..core.errors import Refused
 from ..core.finding import Finding
 from ..core.rows import Row, column
 from ..core.text import block, environment, say
-from ..core.words import in_one_line
 from ..report import files
+from ..report.document import joined, page_of
 from ..report.provenance import OURS, commit, installed
 from ..report.verdict import Report, Section, failures, worst
 from ..run.reference import Reference
@@ -29,8 +24,6 @@ AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
 NOT_JUDGED, UNCONFIRMED, ITSELF = "not judged", "unconfirmed", "self-consistent"
 VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED, REFUSED, ITSELF, AGREE)  # in the order of the table
 BAD_VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED)  # exit status 1
-COMPARED = "verdict", "stable_at_file_dt", "limit_s"  # columns whose changes since an earlier fleet are told
-MOVED = 0.01  # relative change of a step limit that is told
 
 
 @dataclass(kw_only=True)
@@ -42,7 +35,6 @@ class FileRow(Row):
     same_as: str | None = None  # the file of which it is a copy
     verdict: str
     reason: str = ""
-    points: float | None = None  # of a rubric
     reference: str | None = None  # the kind of a run.reference.Reference
     joints: int | None = None
     worst_ratio: float | None = None  # largest share of a tolerance
@@ -80,8 +72,7 @@ class FileRow(Row):
 LeftOut = Sequence[tuple[str, str]]  # files that are no models, and why
 HINTS = get_type_hints(FileRow)
 FIELDS = {field.name: HINTS[field.name] for field in fields(FileRow)}
-HIDDEN = "has_report", "points"  # the second is shown with a rubric
-FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name not in HIDDEN)
+FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
 
 
 def row_of_data(data: object) -> FileRow | None:
@@ -92,14 +83,14 @@ def row_of_data(data: object) -> FileRow | None:
     return FileRow(**data) if are_right else None
 
 
-def judge(row: FileRow, report: Report, lost: Sequence[str], reference: Reference) -> None:
+def judge(row: FileRow, report: Report, reference: Reference) -> None:
     """Set the verdict, reason, largest share of a tolerance, and step of a row.
 
-    lost: parts of the report that broke off. The reason names an unstable step and joints of other names too.
+    The reason names an unstable step and joints of other names too.
     """
     sections = report.sections
     failed, top = failures(sections), worst(sections)
-    unfinished = [*(f"{check.experiment}: {check.note}" for check in failed.broke), *lost]
+    unfinished = [f"{check.experiment}: {check.note}" for check in failed.broke]
     checks = [check for section in sections for check in section.result.checks]
     reasons: list[str] = []
     if failed.differing:
@@ -135,73 +126,27 @@ def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
     return (all(stable) if stable else None), min(finite, default=None)
 
 
-def table_of(rows: Sequence[FileRow]) -> str:
-    """fleet.csv."""
-    has_points = any(row.points is not None for row in rows)
-    return files.csv(rows, (*FLEET_COLUMNS, "points") if has_points else FLEET_COLUMNS)
-
-
-def earlier(folder: str) -> dict[str, dict[str, str]]:
-    """The columns COMPARED of an earlier fleet, by file name. Refused if they cannot be read."""
-    path = Path(folder) / "fleet.csv"
-    try:
-        return by_file(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, KeyError, csv.Error):
-        shown = in_one_line(str(path))
-        raise Refused(f"cannot read {shown}; expected the folder of an earlier fleet") from None
-
-
-def by_file(table: str) -> dict[str, dict[str, str]]:
-    return {row["file"]: {name: row[name] for name in COMPARED} for row in csv.DictReader(StringIO(table))}
-
-
-def changes(before: Mapping[str, Mapping[str, str]], rows: Sequence[FileRow]) -> list[str]:
-    """The changes since an earlier fleet, a line for each file: verdict, step, limit, new, removed."""
-    now, lines = by_file(table_of(rows)), []
-    for file in sorted(before.keys() | now.keys()):
-        old, new = before.get(file, {}), now.get(file, {})
-        pairs = {name: (old.get(name, ""), new.get(name, "")) for name in COMPARED}
-        moved = [(name, *pair) for name, pair in pairs.items() if is_change(*pair)]
-        if moved:
-            lines.append(block("fleet", "change", file=file, old=old, new=new, moved=moved))
-    return sorted(lines)
-
-
-def is_change(old: str, new: str) -> bool:
-    try:
-        return abs(float(new) - float(old)) > MOVED * abs(float(old))
-    except ValueError:  # not two numbers
-        return old != new
-
-
-def write_table(
-    out: Path, rows: Sequence[FileRow], left_out: LeftOut, changed: Sequence[str] | None, command: str,
-    most_points: float | None = None,
-) -> list[str]:  # fmt: skip
-    """Write fleet.csv and index.html; the lines of the summary. changed: lines of --since, None: without it.
-
-    most_points: of a rubric; None: there is none.
-    """
+def write_table(out: Path, rows: Sequence[FileRow], left_out: LeftOut, command: str) -> list[str]:
+    """Write fleet.csv, report.md and index.html; the lines of the summary."""
     rows = sorted(rows, key=lambda row: row.order)
-    numbers = dict(Counter(row.verdict for row in rows))  # in the order of VERDICTS
-    copies = sum(row.same_as is not None for row in rows)
-    unstable = [row.file for row in rows if row.stable_at_file_dt is False]
-    about = {"numbers": numbers, "copies": copies, "unstable": unstable, "left_out": left_out}
-    summary = [line for line in block("fleet", "summary", **about).split("\n") if line]
+    about = {
+        "numbers": dict(Counter(row.verdict for row in rows)),  # in the order of VERDICTS
+        "copies": sum(row.same_as is not None for row in rows),
+        "unstable": [row.file for row in rows if row.stable_at_file_dt is False],
+    }
+    summary = [line for line in block("fleet", "summary", **about, left_out=left_out).split("\n") if line]
     origin = {"command": command, "date": datetime.now(UTC).isoformat(timespec="seconds"), "commit": commit()}
     origin |= {OURS: installed(OURS), "mujoco": installed("mujoco")}
-    page = fleet_page(
-        rows, most_points=most_points, summary=summary, left_out=left_out, changed=changed, origin=origin
-    )
-    for name, content in (("fleet.csv", table_of(rows)), ("index.html", page)):
-        write_whole(out / name, content.encode("utf-8", "backslashreplace"))
+    text = document_of(rows, summary=summary, left_out=left_out, origin=origin)
+    page = page_of(block("fleet", "title"), text, not any(row.is_bad for row in rows))
+    texts = {"fleet.csv": files.csv(rows, FLEET_COLUMNS), "report.md": text, "index.html": page}
+    for name, content in texts.items():
+        write_whole(out / name, content)
     return summary
 
 
-def fleet_page(rows: Sequence[FileRow], **values: object) -> str:
-    """The page as HTML. values: summary, left_out, changed, origin and most_points, as in write_table."""
+def document_of(rows: Sequence[FileRow], **values: object) -> str:
+    """report.md. values: summary, left_out and origin, as in write_table."""
     title, good = block("fleet", "title"), not any(row.is_bad for row in rows)
-    pages = environment()
-    body = pages.get_template("fleet.html.jinja").render(rows=rows, title=title, good=good, **values)
-    page = pages.get_template("page.html.jinja")
-    return page.render(title=title, links=(), good=good, body=Markup(body))
+    template = environment().get_template("fleet_document.md.jinja")
+    return joined([template.render(rows=rows, title=title, good=good, **values)])

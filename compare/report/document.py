@@ -77,9 +77,7 @@ class Document:
         text = joined(parts)
         if not self.page:
             return text
-        html = Markup(MarkdownIt("commonmark", {"html": True}).render(text))
-        values = {"title": title, "good": report.passed, "links": self.links(), "body": html}
-        return environment().get_template("page.html.jinja").render(values)
+        return page_of(title, text, report.passed, self.links())
 
     def links(self) -> list[tuple[str, bool]]:
         names = [("questions", False)] if self.answers is not None else []
@@ -144,6 +142,13 @@ class Document:
             return Listing(len(rows), None, name, title)
         few = rows[: MOST_ROWS if self.page else MOST_IN_MARKDOWN]
         return Listing(len(rows), tables.of_rows(few, columns), name, title)
+
+
+def page_of(title: str, text: str, good: bool, links: Sequence[tuple[str, bool]] = ()) -> str:
+    """A document in Markdown as a page. links: its sections, and whether something fails there."""
+    html = Markup(MarkdownIt("commonmark", {"html": True}).enable("table").render(text))
+    values = {"title": title, "good": good, "links": links, "body": html}
+    return environment().get_template("page.html.jinja").render(values)
 
 
 def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 import shutil
 import sys
 
@@ -33,14 +32,13 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, monkeypatch, capsys):
-    monkeypatch.setattr("compare.fleet.command.PERIOD", 0.05)
+def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, capsys):
     assert main(["fleet", "m/**", "--only", "parameters", "--out", "out", "--workers", "1"]) == 1
     shown, err = capsys.readouterr()
     lines = shown.splitlines()
     said = {line.split()[0]: line for line in lines if line.split()[:1] and ".xml:" in line}
     assert err == "" and "out/index.html (" in lines[-1]
-    assert " of 3 files" in shown and "Left out: 1 file" in shown
+    assert " of 3 files" not in shown and "Left out: 1 file" in shown  # progress is for terminals
     assert f"m/x/{NAME}: " in said["self-consistent"] and " %" in said["self-consistent"]
     assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
     assert "\x1b" not in shown and "\r" not in shown  # nothing moves in a pipe
@@ -65,7 +63,7 @@ def test_a_file_has_the_report_that_it_has_alone(folder):
     assert {path.name for path in one.iterdir()} <= {path.name for path in many.iterdir()}
 
 
-def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folder, monkeypatch, capsys):
+def test_the_status_is_1_where_a_file_differs(folder, monkeypatch):
     said, words = [], ["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]
 
     def carry_out(self, progress):
@@ -77,16 +75,12 @@ def test_the_status_is_1_where_a_file_differs_and_what_has_changed_is_said(folde
     for verdict, status in statuses.items():
         said.append(verdict)
         assert main(words) == status
-    said.append("agree")
-    assert "since" not in capsys.readouterr().out
-    assert main([*words, "--since", "out"]) == 0
-    assert re.search(rf"since out: m/x/{NAME}: .*differ.*agree", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("arguments, word", [
     ("--onyl=mass", "did you mean --only?"), ("--reference my.py:", "FILE.xml"), ("--limit nan", "--limit: 'nan'"),
-    ("--only speed", "--timing"), ("--dask x --workers 2", "--workers"), ("--timing --workers 2", "--workers"),
-    ("--since nowhere", "nowhere/fleet.csv"), ("--rubric nowhere.toml", "nowhere.toml is not a TOML file"),
+    ("--only speed", "measures times"), ("--dask x --workers 2", "--workers"), ("--timing", "--timing"),
+    ("--since nowhere", "--since"), ("--rubric a.toml", "--rubric"),
     ("--out m/part.xml", "m/part.xml"),
 ])  # fmt: skip
 def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, folder, capsys):
@@ -97,8 +91,7 @@ def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, 
 
 @pytest.mark.parametrize("words, asked", [
     ("--workers 3 --limit 7", ("Pool", 3, 7.0, True)),
-    ("--dask tcp://x:1 --full", ("Cluster", "tcp://x:1", 1800.0, None, False)),
-    ("--dask tcp://x:1 --timing", ("Cluster", "tcp://x:1", 1800.0, "timing", True)),
+    ("--dask tcp://x:1 --full", ("Cluster", "tcp://x:1", 1800.0, False)),
 ])  # fmt: skip
 def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
     seen = []

@@ -14,12 +14,12 @@ import pytest
 from compare.core.errors import Refused, described
 from compare.fleet import cache as module
 from compare.fleet.cache import locked, write_whole
-from compare.fleet.command import solution_files
+from compare.fleet.command import solution_of
 from compare.fleet.executors import Outcome
 from compare.fleet.models import found_models, place_of_report
 from compare.fleet.run import Run
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, REFUSED, FileRow
-from compare.fleet.task import Compared, FleetOptions
+from compare.fleet.task import FleetOptions
 
 PENDULUM = ("<mujoco><worldbody><body name='b'><joint name='j' axis='0 1 0'/><inertial pos='0 0 {}' mass='1' "
             "diaginertia='1 1 1'/></body></worldbody></mujoco>")  # fmt: skip
@@ -68,10 +68,10 @@ def fleet(tmp_path, monkeypatch):
         for name, text in files.items():
             (tmp_path / "m" / name).parent.mkdir(parents=True, exist_ok=True)
             (tmp_path / "m" / name).write_text(text)
-        sent = solution_files(reference)
-        options = FleetOptions(tuple(names), is_quick, reference, next(iter(sent), ""))
+        solution = solution_of(reference)
+        options = FleetOptions(tuple(names), is_quick, reference, solution and str(solution.path.resolve()))
         executor = Inside(tmp_path / "places", answer)
-        of = Run(found_models(paths)[0], options, executor, tmp_path / "out", sent)
+        of = Run(found_models(paths)[0], options, executor, tmp_path / "out", solution)
         of.carry_out(lambda rows: None)
         rows = {os.path.basename(row.file): row for row in of.rows}
         verdicts = {name: row.verdict for name, row in rows.items()}
@@ -97,9 +97,14 @@ def test_files_agree_or_are_refused_with_the_reason(fleet, tmp_path):
     assert fleet(ONE, ["published"]).rows["a.xml"].verdict == REFUSED  # which serves the arm alone
 
 
-def agrees(shown, *_):
-    row = FileRow(file=shown, verdict=AGREE, seconds=1.0, has_report=True)
-    return Outcome(Compared(row, {"index.html": b"all"}), "")
+def agrees(shown, path, place, options):
+    os.makedirs(place, exist_ok=True)
+    Path(place, "index.html").write_text("all")
+    return Outcome(FileRow(file=shown, verdict=AGREE, seconds=1.0, has_report=True), "")
+
+
+def edit(path):
+    path.write_text("edited")
 
 
 def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
@@ -107,8 +112,9 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     assert len(first.executor.calls) == 2 and second.executor.calls == [] and second.rows == first.rows
     third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, answer=agrees)
     assert set(third.executor.calls) == {"m/b.xml", "m/b/a.xml"}
-    (report(tmp_path, "b.xml") / ".fleet").write_bytes(b"damaged")
-    assert fleet({}, answer=agrees).executor.calls == ["m/b.xml"]
+    for name, act in (".fleet", Path.unlink), ("index.html", Path.unlink), ("index.html", edit), (".fleet", edit):
+        act(report(tmp_path, "b.xml") / name)  # a saved result that is gone or edited is made anew
+        assert fleet({}, answer=agrees).executor.calls == ["m/b.xml"], name
     for more in ({"is_quick": False}, {"names": ("gravity",)}):
         assert fleet({}, answer=agrees, paths=["m/a.xml"], **more).executor.calls == ["m/a.xml"]
     for place, computed in ((0.1, 1), (0.1, 0), (0.2, 1)):
@@ -127,11 +133,11 @@ class Touch:
 def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(fleet, tmp_path):
     fleet(ONE, answer=agrees)
     mark = report(tmp_path, "a.xml") / ".fleet"
-    key, row = json.loads(mark.read_text())
+    key, files, row = json.loads(mark.read_text())
     assert fleet({}, answer=agrees).executor.calls == []
     wrong = {"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1}
-    poisons = [json.dumps((key, other)).encode() for other in ([row], *(row | more for more in wrong))]
-    for poison in (*poisons, pickle.dumps((key, Touch()))):
+    poisons = [json.dumps((key, files, other)).encode() for other in ([row], *(row | more for more in wrong))]
+    for poison in (*poisons, pickle.dumps((key, files, Touch()))):
         mark.write_bytes(poison)
         assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"], poison
     assert not Path("ran").exists()
@@ -179,12 +185,11 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
 def test_a_folder_is_for_one_fleet_at_a_time_and_what_cannot_be_written_is_said(tmp_path):
     with locked(tmp_path / "out"), pytest.raises(Refused, match="another"), locked(tmp_path / "out"):
         pass
-    with locked(tmp_path / "out"):
-        write_whole(tmp_path / "out" / "a", {"b/c": b"1"})
-        write_whole(tmp_path / "out" / "a", {"d": b"2"})
-    assert [path.name for path in (tmp_path / "out" / "a").iterdir()] == ["d"]
+    for text in "12":
+        write_whole(tmp_path / "out" / "a", text)
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"a", "files"}
     with pytest.raises(Refused, match=f"{tmp_path / 'none' / 'a'}: "):
-        write_whole(tmp_path / "none" / "a", b"1")
+        write_whole(tmp_path / "none" / "a", "1")
 
 
 SOURCES = [f"compare/{name}" for name in ("a.py", "a.jinja", "deep/page.html.jinja")]

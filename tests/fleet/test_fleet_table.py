@@ -2,24 +2,19 @@
 
 import csv
 import dataclasses
-import json
+import html
 import random
 import re
-import shutil
 from functools import partial
 from types import SimpleNamespace
 
 import pytest
-import runs
 
-from compare.__main__ import main
 from compare.core.cause import Cause
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
-from compare.core.errors import Refused
 from compare.fleet import table
-from compare.fleet.models import place_of_report
-from compare.fleet.rubric import read_rubric
 from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED, FileRow
+from compare.report.document import page_of
 from compare.report.verdict import Report, Section
 from compare.robots.arm import ARM
 from compare.run.reference import Reference
@@ -43,7 +38,7 @@ def good(share=0.5):
     return "M", share, 1.0, "", "at most", About.MODELS
 
 
-def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference="arm"):
+def judged(*checks, limits=(), runs=(), causes=(), reference="arm"):
     """The row of one section with checks: (quantity, value, tolerance, note, rule, about)."""
     result = Result("stability", tables={"step_limits": list(limits), "own_run": list(runs)})
     for quantity, value, tolerance, note, rule, about in checks:
@@ -53,7 +48,7 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference="arm"):
         result.check("home", quantity, value, tolerance, "s", note, about == About.MODELS, rule, about)
     section, judged_row = Section("stability", "", "", "", result), row()
     report = Report([section], ARM, {}, "", causes)
-    table.judge(judged_row, report, lost, Reference(reference, "a.xml"))
+    table.judge(judged_row, report, Reference(reference, "a.xml"))
     return judged_row
 
 
@@ -62,8 +57,8 @@ def judged(*checks, limits=(), runs=(), causes=(), lost=(), reference="arm"):
     (AGREE, [good(), OWN], {}, "2 ms"),  # its own step is not stable: the reason says so
     (NOT_JUDGED, [good(), STILL], {}, "nothing moves"), (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
-    (DIFFER, [good(1.0 + 1e-9), BROKEN], {"causes": CAUSES, "lost": ["the table"]}, "SIGKILL, 4 times, and 1 more"),
-    (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"), (BROKE, [good()], {"lost": ["the table"]}, "the table"),
+    (DIFFER, [good(1.0 + 1e-9), BROKEN, BROKEN], {"causes": CAUSES}, "SIGKILL, 4 times, and 1 more"),
+    (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
     (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"), (REFUSED, [], {}, "no comparison"),
 ])  # fmt: skip
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
@@ -105,130 +100,37 @@ def test_what_needs_a_look_comes_first():
         assert sorted(random.Random(seed).sample(rows, len(rows)), key=lambda row: row.order) == rows
 
 
-@pytest.mark.parametrize("before, now, named", [
-    ({}, {"seconds": 99.0, "worst_ratio": 0.9, "sha256": "2", "reason": "other"}, None),
-    ({}, {"verdict": DIFFER, "reason": "mass of x"}, ["agree", "differ"]),
-    ({"stable_at_file_dt": None}, {"stable_at_file_dt": False}, ["stable unknown", "false"]),
-    ({}, {"limit": 0.010099}, None),
-    ({}, {"limit": 0.010101}, ["0.01 ", "0.010101"]),
-    ({"limit": None}, {}, ["unknown", "0.01"]),
-    ({}, {"file": "new.xml", "verdict": REFUSED}, ["a b.xml", "agree", "new.xml", "refused"]),  # and one is gone
-])  # fmt: skip
-def test_a_verdict_a_step_or_a_limit_that_is_another_is_told(before, now, named, tmp_path):
-    (tmp_path / "fleet.csv").write_text(table.table_of([row(**before)]), encoding="utf-8")
-    found = table.changes(table.earlier(tmp_path), [row(**now)])
-    places = [" ".join(found).index(name) for name in named or ()]
-    assert bool(found) == bool(named) and places == sorted(places)
+def cells_of(rows, **more):
+    """report.md of a fleet, and the cells of its page."""
+    text = table.document_of(rows, **{"summary": ["3 files"], "left_out": (), "origin": {"command": "c"}} | more)
+    page = page_of("A fleet", text, True)
+    return text, page, [re.findall("<td>(.*?)</td>", line) for line in page.split("<tr>")[2:]]
 
 
-def page_of(rows, **more):
-    given = {"summary": [], "left_out": (), "changed": None, "origin": {}, "most_points": None}
-    return table.fleet_page(rows=rows, **given | more)
-
-
-def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_html():
+def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_markup():
     rows = [ROW, row(stable_at_file_dt=False), FileRow(file="a b.xml", verdict=REFUSED), row(verdict=ITSELF)]
-    text = page_of(rows)
-    assert re.findall(r'<td class="limit_s">(.*?)</td>', text) == ["10", "10", "", "10"]
-    assert re.findall(r'<tr class="(\w+)">', text) == ["good", "bad", "none", "none"]
-    assert '<th scope="row">a b.xml</th>' in text and '<div class="verdict good">' in text
-    text = page_of([row(verdict=UNCONFIRMED)])
-    assert '<div class="verdict bad">' in text and '<tr class="bad">' in text
-    said, name, value, why, reason, change = words = [f'<w{k}>&"' for k in range(6)]
-    more = {"left_out": [("a", why)], "changed": [change], "origin": {name: value}}
-    text = page_of([row(reason=reason)], summary=[said], **more)
-    for k in range(len(words)):
-        assert f"<w{k}>" not in text and f"&lt;w{k}&gt;&amp;" in text
+    text, page, cells = cells_of(rows)
+    assert [line[9] for line in cells] == ["10", "10", "", "10"]
+    assert re.findall(r'<span class="mark (\w+)">', page) == ["good", "bad", "none", "none"]
+    assert cells[2][0] == "a b.xml" and '<div class="verdict good">' in text
+    assert '<div class="verdict bad">' in cells_of([row(verdict=UNCONFIRMED)])[0]
+    said, name, value, why, reason, file = words = [f'<w{k}>&"|`*' for k in range(6)]
+    more = {"left_out": [("a", why)], "origin": {name: value}, "summary": [said]}
+    _, page, cells = cells_of([row(reason=reason, file=file)], **more)
+    assert len(cells) == 1 and len(cells[0]) == 11
+    assert "<w" not in page and all(word in html.unescape(page) for word in words)
 
 
 def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     rows = [ROW, row(file="b.xml", verdict=DIFFER), row(file="c.xml", stable_at_file_dt=False),
             row(file="d.xml", same_as="c.xml", verdict=REFUSED)]  # fmt: skip
-    summary = table.write_table(tmp_path, rows, [("early.xml", "because")], None, "the command")
+    summary = table.write_table(tmp_path, rows, [("early.xml", "because")], "the command")
     assert all(part in summary[0] for part in ("4 files", "1 copy", "1 was refused"))
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
     assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]
     assert tuple(found[0]) == table.FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
-    text = (tmp_path / "index.html").read_text()
-    assert all(part in text for part in ("early.xml", "the command", '"files/c.xml/index.html">d.xml</a>'))
-    assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")
-
-
-EXPERIMENTS = "parameters", "mass"
-
-
-RIGHT = """parameters = 4
-[mass]
-Mbar = 1.5
-"M, bent" = 0.5
-"""
-
-
-def read(tmp_path, content):
-    path = tmp_path / "points.toml"
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return read_rubric(str(path), EXPERIMENTS)
-
-
-@pytest.mark.parametrize("content, word", [
-    ("mass = ", "not a TOML file"), (b"\xff\xfe", "not a TOML file"), ("[[[", "not a TOML file"), ("", "no entry"),
-    ("speed = 1", "speed is not an experiment of this fleet: parameters and mass"),
-    ("[mas]\nMbar = 1", "mas is not an experiment"),
-    ("mass = -1", "mass is -1; expected points"), ("mass = true", "mass is True"), ("mass = 'two'", "mass is 'two'"),
-    ("mass = nan", "mass is nan"), ("[mass]\nMbar = [1]", r"mass: Mbar is \[1\]"),
-])  # fmt: skip
-def test_what_is_wrong_in_a_rubric_is_one_line(content, word, tmp_path):
-    with pytest.raises(Refused, match=word) as refused:
-        read(tmp_path, content)
-    assert len(str(refused.value).splitlines()) == 1 and "points.toml" in str(refused.value)
-
-
-def report(tmp_path, name, checks):
-    """Write the report of a file with checks (experiment, quantity, scene, passed)."""
-    folder = tmp_path / place_of_report(name)
-    folder.mkdir(parents=True)
-    fields = "experiment", "quantity", "scene", "passed"
-    content = {"checks": [dict(zip(fields, check)) for check in checks]}
-    (folder / "results.json").write_text(json.dumps(content))
-    return FileRow(file=name, verdict=AGREE, has_report=True)
-
-
-@pytest.mark.parametrize("checks, points", [
-    ([("parameters", "com", "a", True), ("mass", "Mbar", "bent", True), ("mass", "M", "bent", True)], 6.0),
-    ([("parameters", "com", "a", True), ("parameters", "com", "b", False), ("mass", "Mbar", "bent", True)], 1.5),
-    ([("mass", "M", "bent", True), ("mass", "M", "zero", False), ("mass", "Mbar", "zero", False)], 0.5),
-    ([("gravity", "Mbar", "bent", True)], 0.0),
-])  # fmt: skip
-def test_all_checks_of_an_entry_must_pass_and_one_at_least_be_there(checks, points, tmp_path):
-    rubric = read(tmp_path, RIGHT)
-    every = [("parameters", "", "", True), ("mass", "Mbar", "", True), ("mass", "M", "bent", True)]
-    rows = [report(tmp_path, "a.xml", checks), report(tmp_path, "b.xml", every)]
-    rows.append(FileRow(file="c.xml", verdict=REFUSED))
-    rows.append(FileRow(file="d.xml", verdict=AGREE, has_report=True, same_as="a.xml"))
-    rubric.award(rows, tmp_path)
-    assert [row.points for row in rows] == [points, 6.0, 0.0, points] and rubric.total == 6.0
-
-
-def test_a_check_that_no_file_has_is_named_with_those_that_are_known(tmp_path):
-    rubric = read(tmp_path, "[mass]\nNbar = 1")
-    row = report(tmp_path, "a.xml", [("mass", "Mbar", "bent", True)])
-    with pytest.raises(Refused, match="mass: no file has a check 'Nbar'; known: Mbar"):
-        rubric.award([row], tmp_path)
-    rubric.award([FileRow(file="a.xml", verdict=REFUSED)], tmp_path)  # no report: nothing is known
-
-
-def test_points_are_in_the_table_and_in_the_page(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(runs.ROOT / "tests" / "models" / "pendulum_ball.xml", "a.xml")
-    (tmp_path / "b.xml").write_text("no model")
-    (tmp_path / "points.toml").write_text("parameters = 3")
-    words = ["fleet", "a.xml", "b.xml", "--only", "parameters", "--out", "out", "--workers", "1"]
-    assert main([*words, "--rubric", "points.toml"]) == 0
-    with (tmp_path / "out" / "fleet.csv").open(encoding="utf-8", newline="") as file:
-        rows = {row["file"]: row["points"] for row in csv.DictReader(file)}
-    assert rows == {"a.xml": "3.0", "b.xml": "0.0"}
-    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
-    assert ">3 of 3<" in page and ">0 of 3<" in page and ">points<" in page
-    assert main(words) == 0
-    assert "points" not in (tmp_path / "out" / "fleet.csv").read_text(encoding="utf-8")
+    for name in ("index.html", "report.md"):
+        text = (tmp_path / name).read_text()
+        assert all(part in text for part in ("early.xml", "the command", '"files/c.xml/index.html">d.xml</a>'))
+        assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

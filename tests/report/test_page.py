@@ -3,7 +3,6 @@
 import json
 import re
 import subprocess
-from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -14,7 +13,7 @@ from compare.core.cause import Cause
 from compare.report import images, provenance
 from compare.report.document import Document
 from compare.report.files import write
-from compare.report.verdict import OVERVIEW, Figure, Report, verdict
+from compare.report.verdict import OVERVIEW, Report, verdict
 from compare.robots.arm import ARM
 
 CAUSE = Cause(rank=2, place="mass of forearm", stated=1.5, explains=1.6, text="forearm: 1.6 kg")
