@@ -69,7 +69,7 @@ EDITS = (
     ("own.functions", "of_symbols", "len(set(symbols)) < len(symbols)", "False", "a symbol may come twice"),
     ("own.functions", "of_symbols", "dummy in used", "False", "h may depend on tau"),
     ("own.functions", "of_symbols", "used - set(plain)", "set()", "an unknown symbol is taken"),
-    ("own.own_file", "aside", "redirect_stdout(sys.stderr)", "redirect_stdout(sys.stdout)",
+    ("own.own_file", "aside", "redirect_stdout(Capped())", "redirect_stderr(Capped())",
      "a print of own code is in the output"),
     ("own.own_file", "own_object", "sys.path.append(folder)", "sys.path.insert(0, folder)", "a file beside shadows a package"),
     ("own.equations", "OwnEquations.own_states", "self.joints.own_forces", "self.joints.own_speeds", "tau is taken as a speed"),
