@@ -107,7 +107,7 @@ class Robot:
         """The robot with changes, the fields of a Scene."""
         return Case(self, Scene(name, **changes))
 
-    @property
+    @cached_property
     def cases(self) -> "tuple[Case, ...]":
         return tuple(Case(self, scene) for scene in self.scenes)
 

@@ -1,4 +1,4 @@
-"""Time against error: all integrators of MuJoCo, all methods of tmt, SciPy and heyoka, all useful steps."""
+"""Time against error: the integrators of MuJoCo, the methods of tmt, SciPy, heyoka and engines that read the file."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
@@ -11,13 +11,15 @@ from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...truth.reference import LOST, has_no_reference
-from .. import Experiment
+from .. import ALWAYS, Experiment
 from ..setup import Setup, different_first
 from . import conclusions, evaluations
-from .runs import FIRST_STEPS, SceneRuns, SpeedResult, SpeedRow, prepared, runs_of, scene_runs, take_times
+from .runs import FIRST_STEPS, RunRow, SceneRuns, SpeedResult, rows_of, scene_runs, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
-EXPERIMENT = Experiment(order=90, serves_own=False, options=("--scenes",), timed=True, overview="times")
+EXPERIMENT = Experiment(
+    order=90, serves_own=False, options=("--scenes", "--engines"), timed=True, overview="times"
+)
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:
@@ -41,16 +43,22 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
     names = [case.name for case in setup.robot.cases]
     scenes = sorted(begin(setup) if work is None else work, key=lambda scene: names.index(scene.case.name))
     loops = evaluations.loops(setup)
-    add_times(setup, scenes)
+    setup.quiet()  # nothing else may run while times are taken
+    for scene in scenes:
+        setup.progress(f"speed: timing {scene.case.name}")
+        take_times(scene.case, scene.rows, setup.engines)
+        called = rows_of(scene, setup.engines, setup.size, compiled=False)
+        take_times(scene.case, [row for row in called if row.time < timing.TIMED_ENOUGH], setup.engines)
+        scene.rows += called
     result = judged(setup, scenes)
-    cheapest = conclusions.cheapest_settings(result)
-    if cheapest["settings"]:
-        result.headline = result.finding("headline", **cheapest)
-    result.tables["what_should_i_use"] = conclusions.advice(result)
+    result.tables["what_should_i_use"] = conclusions.what_to_use(result)
+    result.headline = result.finding("headline", **uses(result))
+    result.top.append(result.finding("answer", **uses(result)))
     result.find("columns")
     setup.progress("speed: one evaluation")
     result.tables["evaluations"] = evaluations.costs(loops, setup.of(12, 5, 2))
-    result.find("timing", once=timing.TIMED_ENOUGH, first_steps=FIRST_STEPS)
+    prepared = compilation(result.rows)
+    result.find("timing", once=timing.TIMED_ENOUGH, first_steps=FIRST_STEPS, prepared=prepared)
     add_absent(result, setup)
     return result
 
@@ -58,7 +66,7 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
 def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     """The rows of the scenes, and checks of their errors and orders."""
     regular = regular_of(setup.robot)
-    result = SpeedResult("speed", shown=[], rows=[run.row for scene in scenes for run in scene.runs])
+    result = SpeedResult("speed", shown=[], rows=[row for scene in scenes for row in scene.rows])
     result.floors = {scene.case.name: scene.floor for scene in scenes}
     result.regular, result.unit = regular.name, movement_unit(setup.robot.coordinates)
     result.servos_off = bool(setup.robot.drive and setup.robot.drive.feeds_back) and not regular.controller
@@ -79,16 +87,29 @@ def judged(setup: Setup, scenes: Sequence[SceneRuns]) -> SpeedResult:
     return result
 
 
-def add_times(setup: Setup, scenes: Sequence[SceneRuns]) -> None:
-    """Add the runs of engines that are called; set the seconds of all."""
-    calls_of_scenes = [prepared(scene.case, scene.runs, setup.engines) for scene in scenes]
-    setup.quiet()  # nothing else may run while times are taken
-    for scene, calls in zip(scenes, calls_of_scenes):
-        setup.progress(f"speed: timing {scene.case.name}")
-        called = runs_of(scene, setup.engines, setup.size, compiled=False)
-        again = [run for run in called if run.row.time < timing.TIMED_ENOUGH]
-        take_times(scene.runs + again, calls + prepared(scene.case, again, setup.engines))
-        scene.runs += called
+def uses(result: SpeedResult) -> dict[str, Any]:
+    """What to use where errors are regular, of each engine by error; and the cheapest of all, of tmt and of MuJoCo."""
+    table = [row for row in result.tables["what_should_i_use"] if row.scene == result.regular]
+    first = [row for row in table if row.target == conclusions.TARGET]
+    by_engine = {LABELS[row.engine]: [one for one in table if one.engine == row.engine] for row in first}
+    cheapest = [row for row in first if row.method and (row is first[0] or row.engine in ALWAYS)]
+    return {
+        "scene": result.regular, "unit": result.unit, "servos_off": result.servos_off,
+        "target": conclusions.TARGET, "targets": conclusions.TARGETS, "engines": by_engine,
+        "cheapest": {LABELS[row.engine]: row for row in cheapest}, "first_steps": FIRST_STEPS,
+    }  # fmt: skip
+
+
+def compilation(rows: Sequence[RunRow]) -> dict[str, float]:
+    """Seconds in which each engine has compiled, or loaded, what its methods run, where it took 10 ms."""
+    methods: dict[tuple[str, str], float] = {}
+    for row in rows:
+        key = LABELS[row.engine], row.method
+        methods[key] = max(methods.get(key, 0.0), row.compile_seconds or 0.0)
+    engines: dict[str, float] = {}
+    for (engine, _), seconds in methods.items():
+        engines[engine] = engines.get(engine, 0.0) + seconds
+    return {engine: seconds for engine, seconds in engines.items() if seconds >= 0.01}
 
 
 def add_absent(result: SpeedResult, setup: Setup) -> None:
@@ -97,10 +118,14 @@ def add_absent(result: SpeedResult, setup: Setup) -> None:
     for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
         groups.setdefault((engine, reason), []).append(method)
     for (engine, reason), names in groups.items():
+        for scene in result.floors:
+            about = {"scene": scene, "engine": engine, "method": ", ".join(names), "unit": result.unit}
+            result.rows.append(RunRow(**about, why_not=reason))
+    for row in [row for row in result.rows if row.why_not and row.scheme]:
+        groups.setdefault((row.engine, row.why_not or ""), []).append(row.method)
+    for (engine, reason), names in groups.items():
         methods = [] if len(names) == len(setup.engines[engine].methods) else names
         result.find("absent", engine=LABELS.get(engine, engine), methods=methods, reason=reason)
-        for scene in result.floors:
-            result.rows.append(SpeedRow(scene, engine, ", ".join(names), why_not=reason, unit=result.unit))
 
 
 def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:
@@ -115,5 +140,6 @@ def figures(result: SpeedResult, robot: Robot) -> Iterator[partial[Any]]:
 def overview(results: Mapping[str, SpeedResult], robot: Robot) -> Iterator[partial[Any]]:
     from .figures_speed import draw_overview  # matplotlib is for the process that draws
 
-    if conclusions.best_rows(results["speed"]):
-        yield partial(draw_overview, results["speed"])
+    result = results["speed"]
+    if result.tables.get("what_should_i_use"):
+        yield partial(draw_overview, result, **uses(result))

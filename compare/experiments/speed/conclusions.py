@@ -4,21 +4,22 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 
 from ...core.rows import MOVEMENT, MovementRow, Row, column
-from ...engines import Method
+from ...engines import RECORDS
 from ...judge.order import LEAST_ORDER, MeasuredOrder, check_order, is_higher, measured_order
-from ...judge.scale import FACTOR
-from ..followed import REGULAR
-from .runs import NEAR_ROUNDING, Run, SceneRuns, SpeedResult, SpeedRow
+from ...judge.scale import EPS, FACTOR
+from .runs import EARLY, RunRow, SceneRuns, SpeedResult, same_scheme
 
+REGULAR = 3e-2  # rad: a smaller error up to EARLY falls with the order of the method
 SMALL_ERROR = 0.1  # rad: a smaller error is changed by rounding by no more than a small difference grows
 CLEAR = 2e-12  # rad: an error up to EARLY above this is far above rounding
-TARGETS = (1e-2, 1e-3, 1e-6, 1e-9, 1e-12)  # rad or m, worst error of a run
-TARGET = 1e-6  # rad or m: the error for which the first screen has the cheapest setting
+CLEAR_EPS = 100.0  # the same of an engine in another precision, its eps, and an eps of each step
+NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
+TARGETS = (1e-3, 1e-6, 1e-9)  # rad or m, worst error of a run
+TARGET = 1e-6  # rad or m: the error for which the first screen has the cheapest settings
 NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
 
 
@@ -35,47 +36,52 @@ class OrderRow(Row):
 
 def check_orders(result: SpeedResult, scenes: Sequence[SceneRuns], engines: Sequence[str]) -> list[OrderRow]:
     """Rows and checks: the stated and the measured order of each method of fixed step of these engines."""
-    rows = []
+    table = []
     for scene in scenes:
-        orders: list[tuple[Method, int, MeasuredOrder]] = []
+        orders: list[tuple[RunRow, MeasuredOrder]] = []
         higher: list[OrderRow] = []  # with the same order as tmt's
-        for method, runs in groupby(scene.runs, key=lambda run: run.method):
-            measured = order_in(scene, list(runs)) if method.order and method.engine in engines else None
-            if method.order and measured:
-                orders.append((method, method.order, measured))
-        by_tmt = {method.scheme: measured.order for method, _, measured in orders if method.engine == "tmt"}
-        for method, order, measured in orders:
-            where, note = f"{scene.case.name}, {method.engine} {method.name}", f"{measured.order:.2f}"
-            twin = by_tmt.get(method.scheme) if method.engine != "tmt" else None
+        for _, group in groupby(scene.rows, key=lambda row: (row.engine, row.method)):
+            rows = [row for row in group if row.order and row.engine in engines]
+            if rows and (measured := order_in(scene, rows)):
+                orders.append((rows[0], measured))
+        by_tmt = {row.scheme: measured.order for row, measured in orders if row.engine == "tmt"}
+        for row, measured in orders:
+            where, note = f"{scene.case.name}, {row.engine} {row.method}", f"{measured.order:.2f}"
+            twin, order = by_tmt.get(row.scheme) if row.engine != "tmt" else None, row.order or 0
             check = check_order(result, where, order, measured.order, note=note, twin=twin)
-            rows.append(OrderRow(scene.case.name, method.engine, method.name, order, *measured))
+            table.append(OrderRow(scene.case.name, row.engine, row.method, order, *measured))
             if check.passed and order not in LEAST_ORDER and is_higher(measured.order, order):
-                higher.append(rows[-1])
+                higher.append(table[-1])
         if higher:
             result.find("higher", scene=scene.case.name, rows=higher)
-    return rows
+    return table
 
 
-def order_in(scene: SceneRuns, runs: Sequence[Run]) -> MeasuredOrder | None:
-    """The order of a method where its errors are regular; of a robot from a file, one that has settled."""
-    clear, least_runs = CLEAR, 2
+def order_in(scene: SceneRuns, rows: Sequence[RunRow]) -> MeasuredOrder | None:
+    """The order of a method where its errors are regular; where they are less well known, one that has settled."""
+    record, clear, least_runs = RECORDS[rows[0].engine], CLEAR, 2
     if scene.case.robot.is_read:  # the error of rounding, or of the reference, differs from robot to robot
         clear, least_runs = max(CLEAR, NEAR_ROUNDING * scene.floor), 3
-    regular = [run for run in runs if clear < run.early < REGULAR]
-    least_runs = 2 if runs[0].method.order in LEAST_ORDER else least_runs
-    return measured_order([run.dt for run in regular], [run.early for run in regular], least_runs)
+    if record.reads_file:
+        least_runs = 4
+    if rows[0].order in LEAST_ORDER:
+        least_runs = 2
+    known = [(row.dt, row.early_error, clear) for row in rows if row.dt and row.early_error is not None]
+    if record.eps > EPS:
+        known = [(dt, error, max(clear, max(CLEAR_EPS, EARLY / dt) * record.eps)) for dt, error, _ in known]
+    regular = [(dt, error) for dt, error, least in known if least < error < REGULAR]
+    return measured_order([dt for dt, _ in regular], [error for _, error in regular], least_runs)
 
 
 def check_same_schemes(result: SpeedResult, scene: SceneRuns) -> None:
     """MuJoCo's integrators and the same schemes in tmt make the same error, up to half an eps a step."""
-    by_tmt = {(run.method.name, run.row.dt): run.row for run in scene.runs if run.method.engine == "tmt"}
-    for run in scene.runs:
-        mujoco, twin = run.row, by_tmt.get((run.method.scheme, run.row.dt))
-        if mujoco.engine == "mujoco" and twin and min(mujoco.largest_error, twin.largest_error) < SMALL_ERROR:
-            difference = abs(mujoco.largest_error - twin.largest_error)
-            where = f"{scene.case.name}, {mujoco.method}, dt = {run.dt:.3g} s"
+    for row in [row for row in scene.rows if row.engine == "mujoco"]:
+        twin = same_scheme(scene.rows, row)
+        if twin and min(row.largest_error, twin.largest_error) < SMALL_ERROR:
+            difference = abs(row.largest_error - twin.largest_error)
+            where = f"{scene.case.name}, {row.method}, dt = {row.dt:.3g} s"
             quantity = f"the same error as tmt's {twin.method}"
-            tolerance = max(FACTOR, (mujoco.steps or 0) / 2.0) * scene.floor
+            tolerance = max(FACTOR, (row.steps or 0) / 2.0) * scene.floor
             result.check(where, quantity, difference, tolerance, result.unit, rounding=True)
 
 
@@ -97,8 +103,8 @@ def check_stopped(
     result: SpeedResult, scene: SceneRuns, engine: str, method: str, rounding: float
 ) -> dict[float, float]:
     """The errors of a method by its step. Checks the smallest one, if finer steps gain nothing."""
-    runs = [run for run in scene.runs if (run.method.engine, run.method.name) == (engine, method)]
-    errors = {run.dt: run.row.largest_error for run in runs}
+    rows = [row for row in scene.rows if (row.engine, row.method) == (engine, method)]
+    errors = {row.dt: row.largest_error for row in rows if row.dt}
     least = min(errors.values(), default=np.inf)
     if np.isfinite(least) and [*errors.values()].index(least) < len(errors) - 1:
         quantity = f"smallest error of {engine}'s {method}, where smaller steps gain nothing"
@@ -107,97 +113,66 @@ def check_stopped(
 
 
 @dataclass(kw_only=True)
-class AdviceRow(MovementRow):
-    """The cheapest settings for an error in a scene.
-
-    ratio: MuJoCo's time over tmt's. It is the product of integrator_part (MuJoCo's cheapest over its RK4),
-    kernel_part (MuJoCo's RK4 over tmt's with the same step) and method_part (that over tmt's cheapest).
-    """
+class UseRow(MovementRow):
+    """The cheapest setting of an engine for an error in a scene; without a method: no setting reaches it."""
 
     scene: str
     target: float = column(MOVEMENT)
-    ratio: float | None
-    integrator_part: float | None
-    kernel_part: float | None
-    method_part: float | None
-    mujoco: str
-    mujoco_dt: float | None = column("s", digits=5)
-    mujoco_ms: float | None
-    mujoco_evaluations: int | None
-    tmt: str
-    tmt_dt: float | None = column("s", digits=5)
-    tmt_ms: float | None
-    tmt_evaluations: int | None
-    of_all: str
-    of_all_dt: float | None = column("s")
-    of_all_ms: float | None
-    of_all_evaluations: int | None
+    engine: str
+    method: str | None = None
+    dt: float | None = column("s", digits=5, default=None)
+    tolerance: float | None = None
+    steps: int | None = None
+    ms: float | None = None
+    extrapolated: bool | None = None  # from the time of the first steps
+    evaluations: int | None = None
+    worst_error: float | None = column(MOVEMENT, default=None)
+    energy_error: float | None = column("J", default=None)
+    over_cheapest: float | None = None  # its time over that of the cheapest engine
+    over_same_scheme: float | None = None  # its time over that of tmt's same scheme with the same step
 
 
-def advice(result: SpeedResult) -> list[AdviceRow]:
-    """For each scene and error the cheapest setting of MuJoCo, of tmt and of all."""
-    table = []
-    for scene in result.floors:
-        rows = [row for row in result.rows if row.scene == scene and not row.diverged]
-        for target in TARGETS:
-            reach = reaching(rows, target)
-            mujoco, tmt = cheapest(reach, "mujoco"), cheapest(reach, "tmt")
-            rk4 = cheapest(reach, "mujoco", "RK4")
-            same_step = cheapest([row for row in rows if rk4 and row.dt == rk4.dt], "tmt", "rk4")
-            ratios: dict[str, Any] = {"ratio": ratio(mujoco, tmt), "integrator_part": ratio(mujoco, rk4)}
-            ratios |= {"kernel_part": ratio(rk4, same_step), "method_part": ratio(same_step, tmt)}
-            settings = setting("mujoco", mujoco) | setting("tmt", tmt) | setting("of_all", cheapest(reach))
-            table.append(AdviceRow(scene=scene, target=target, unit=result.unit, **ratios, **settings))
-    return table
-
-
-def setting(name: str, row: SpeedRow | None) -> dict[str, Any]:
-    """The fields of an AdviceRow that describe a setting."""
-    if row is None:
-        return {name: "none", f"{name}_dt": None, f"{name}_ms": None, f"{name}_evaluations": None}
-    steps = f"{row.steps} steps" if row.dt else f"tolerance {row.tolerance:.0e}"
-    of_run = {f"{name}_dt": row.dt, f"{name}_ms": 1e3 * row.time, f"{name}_evaluations": row.evaluations}
-    return {name: f"{row.engine} {row.method}, {steps}"} | of_run
-
-
-def cheapest(rows: Sequence[SpeedRow], engine: str = "", method: str = "") -> SpeedRow | None:
-    """The run that takes the least time, of all or of an engine or method."""
-    fit = [row for row in rows if engine in ("", row.engine) and method in ("", row.method)]
+def cheapest(rows: Sequence[RunRow], target: float = math.inf, **where: object) -> RunRow | None:
+    """The run with an error of at most `target`, rad or m, that takes the least time. where: fields of its row."""
+    timed = (row for row in rows if row.largest_error <= target and row.time < math.inf)
+    fit = [row for row in timed if all(getattr(row, name) == value for name, value in where.items())]
     return min(fit, key=lambda row: row.time, default=None)
 
 
-def ratio(slow: SpeedRow | None, fast: SpeedRow | None) -> float | None:
-    return slow.time / fast.time if slow and fast else None
+def what_to_use(result: SpeedResult) -> list[UseRow]:
+    """For each scene and error the cheapest setting of each engine that has runs there, the cheapest engine first."""
+    table = []
+    for scene in result.floors:
+        rows = [row for row in result.rows if row.scene == scene and row.why_not is None]
+        engines = dict.fromkeys(row.engine for row in rows)
+        for target in TARGETS:
+            best = {engine: cheapest(rows, target, engine=engine) for engine in engines}
+            least = min((row.time for row in best.values() if row), default=math.inf)
+            uses = [use_of(scene, target, engine, best[engine], rows, least) for engine in engines]
+            table += sorted(uses, key=lambda use: math.inf if use.ms is None else use.ms)
+    return table
 
 
-def front(rows: Sequence[SpeedRow]) -> list[SpeedRow]:
+def use_of(
+    scene: str, target: float, engine: str, row: RunRow | None, rows: Sequence[RunRow], least: float
+) -> UseRow:
+    """The row of an engine's cheapest run; None: there is none. least: s, of all engines."""
+    use = UseRow(scene=scene, target=target, engine=engine, unit=rows[0].unit)
+    if row:
+        twin = same_scheme(rows, row)
+        use.method, use.dt, use.tolerance = row.method, row.dt, row.tolerance
+        use.steps, use.evaluations, use.ms = row.steps, row.evaluations, 1e3 * row.time
+        use.extrapolated, use.over_cheapest = row.extrapolated, row.time / least
+        use.worst_error, use.energy_error = row.worst_error, row.energy_error
+        use.over_same_scheme = row.time / twin.time if twin else None
+    return use
+
+
+def front(rows: Sequence[RunRow]) -> list[RunRow]:
     """The rows than which no other is both faster and more exact, from the fastest to the most exact."""
-    best: list[SpeedRow] = []
+    best: list[RunRow] = []
     least = NOT_SOLVED
     for row in sorted(rows, key=lambda row: (row.time, row.largest_error)):
-        if row.largest_error < least:
-            best.append(row)
-            least = row.largest_error
+        if row.largest_error < least and row.time < math.inf:
+            best, least = [*best, row], row.largest_error
     return best
-
-
-def best_rows(result: SpeedResult) -> dict[str, list[SpeedRow]]:
-    """The front of each engine that computed the scene in which errors are regular."""
-    of_engine: dict[str, list[SpeedRow]] = {}
-    for row in result.rows:
-        if row.scene == result.regular and row.time < math.inf:
-            of_engine.setdefault(row.engine, []).append(row)
-    return {engine: best for engine, rows in of_engine.items() if (best := front(rows))}
-
-
-def reaching(rows: Sequence[SpeedRow], target: float) -> list[SpeedRow]:
-    return [row for row in rows if row.largest_error <= target]
-
-
-def cheapest_settings(result: SpeedResult) -> dict[str, Any]:
-    """For TARGET where errors are regular: the cheapest of all engines and of MuJoCo (else tmt)."""
-    reach = reaching([row for row in result.rows if row.scene == result.regular], TARGET)
-    first = cheapest(reach)
-    other = "tmt" if first and first.engine == "mujoco" else "mujoco"
-    about = {"scene": result.regular, "unit": result.unit, "servos_off": result.servos_off, "target": TARGET}
-    return about | {"settings": [row for row in (first, cheapest(reach, other)) if row]}

@@ -1,7 +1,6 @@
-"""Figures of speed: error against time, of each scene and on the first screen."""
+"""Figures of speed: time over error, of each scene and on the first screen."""
 
 from collections.abc import Sequence
-from itertools import cycle
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,59 +8,56 @@ from matplotlib.figure import Figure
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS, MARKS
 from ...report.style import GREY, WIDTH, file_name
-from ..figures import chart
-from .conclusions import TARGET, best_rows, cheapest, cheapest_settings, front, reaching
-from .runs import SpeedResult, SpeedRow
+from ..figures import SIZE
+from .conclusions import TARGET, cheapest, front
+from .runs import RunRow, SpeedResult
 
-METHOD_MARKERS = "osD^v<>PX*hp"  # of the methods of an engine, whose colour they have
 COARSE_END, FINE_END = 3.0, 3e-16  # rad: ends of the axis of errors
 
 
-def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[str, Figure, Finding]:
-    """Worst error against time of one scene, a curve for each method, the Pareto front marked."""
-    fig = Figure(figsize=(WIDTH, 5.6), layout="constrained")
-    ax, unit = fig.subplots(), result.unit
-    ran = [row for row in result.rows if row.scene == scene and row.why_not is None]
-    good = [row for row in ran if row.largest_error <= COARSE_END]
-    curves: dict[tuple[str, str], list[SpeedRow]] = {}
-    for row in good:
-        curves.setdefault((row.engine, row.method), []).append(row)
-    markers: dict[str, cycle[str]] = {}
-    for (engine, method), rows in curves.items():
-        marker = next(markers.setdefault(engine, cycle(METHOD_MARKERS)))
-        label, colour = f"{LABELS.get(engine, engine)} {method}", COLOURS.get(engine, GREY)
-        ax.plot(*drawn(rows), label=label, color=colour, marker=marker, markersize=4.5, linewidth=1.0)
-    ax.plot(*drawn(front(good)), "ko", markersize=9, markerfacecolor="none", label="Pareto front")
-    label = "rounding, or accuracy of the reference"
-    ax.axvline(result.floors[scene], color=GREY, linestyle=":", label=label)
-    ax.set(xscale="log", yscale="log", xlim=(2.0 * COARSE_END, FINE_END / 30), ylabel="time of the run, ms")
-    ax.set(xlabel=f"maximum error, {unit} (decreasing)", xticks=[10.0**k for k in range(0, -17, -2)])
+def draw(rows: Sequence[RunRow], floor: float, unit: str, size: tuple[float, float] = (WIDTH, 4.6)) -> Figure:
+    """Time over worst error of the runs of a scene: a colour for each engine, its cheapest settings joined.
+
+    floor: the error that rounding leaves, rad or m.
+    """
+    fig = Figure(figsize=size, layout="constrained")
+    ax = fig.subplots()
+    for engine in LABELS:
+        of_engine = [row for row in rows if row.engine == engine and row.largest_error <= COARSE_END]
+        if not (best := front(of_engine)):
+            continue
+        look = {"color": COLOURS[engine], "marker": MARKS[engine]}
+        ax.plot(*drawn(of_engine), linestyle="none", markersize=3, alpha=0.3, **look)
+        ax.plot(*drawn(best), label=LABELS[engine], markersize=4.5, linewidth=1.2, **look)
+        if use := cheapest(of_engine, TARGET):
+            ax.plot(*drawn([use]), "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
+    ax.axvline(floor, color=GREY, linestyle=":", label="rounding")
+    ax.axvline(TARGET, color="black", linestyle=":", linewidth=0.8)
+    ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {unit} (decreasing)", ylabel="time, ms")
+    ax.invert_xaxis()
     ax.minorticks_off()
-    fig.legend(loc="outside right upper", fontsize=7, handlelength=1.6)
-    caption = result.finding(
-        "times", begins=beginning or scene, unit=unit, end=COARSE_END,
-        diverged=sum(bool(row.diverged) for row in ran), missing=len(ran) - len(good),
-    )  # fmt: skip
-    return file_name("speed", scene), fig, caption
+    fig.legend(loc="outside upper center", ncols=5, fontsize=8, handletextpad=0.4, columnspacing=1.0)
+    return fig
 
 
-def drawn(rows: Sequence[SpeedRow]) -> tuple[np.ndarray, list[float]]:
+def drawn(rows: Sequence[RunRow]) -> tuple[np.ndarray, list[float]]:
     """Errors, at least FINE_END, and times in ms."""
     return np.maximum([row.largest_error for row in rows], FINE_END), [1e3 * row.time for row in rows]
 
 
-def draw_overview(result: SpeedResult) -> tuple[str, Figure, Finding]:
-    """Time against error: the best settings of each engine; the cheapest within the target has a circle."""
-    fig, ax = chart()
-    for engine, rows in best_rows(result).items():
-        colour, (errors, times) = COLOURS.get(engine, GREY), drawn(rows)
-        label, mark = LABELS.get(engine, engine), MARKS.get(engine, "v")
-        ax.plot(errors, times, label=label, color=colour, marker=mark, markersize=3.5, linewidth=1.2)
-        if best := cheapest(reaching(rows, TARGET)):
-            ax.plot(*drawn([best]), "o", markersize=9, markerfacecolor="none", markeredgecolor="black")
-    ax.axvline(TARGET, color=GREY, linestyle=":", linewidth=1.2)
-    ax.set(xscale="log", yscale="log", xlabel=f"maximum error, {result.unit} (decreasing)", ylabel="time, ms")
-    ax.invert_xaxis()
-    ax.margins(0.06, 0.12)
-    fig.legend(loc="outside upper center", ncols=4, fontsize=8, handletextpad=0.4, columnspacing=1.0)
-    return "overview_times", fig, result.finding("overview_caption", **cheapest_settings(result))
+def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[str, Figure, Finding]:
+    """The runs of one scene."""
+    ran = [row for row in result.rows if row.scene == scene and row.why_not is None]
+    missing = [row for row in ran if not row.largest_error <= COARSE_END]
+    caption = result.finding(
+        "times", begins=beginning or scene, unit=result.unit, end=COARSE_END, target=TARGET,
+        ended=sum(row.ended is not None for row in missing), missing=len(missing),
+    )  # fmt: skip
+    return file_name("speed", scene), draw(ran, result.floors[scene], result.unit), caption
+
+
+def draw_overview(result: SpeedResult, **uses: object) -> tuple[str, Figure, Finding]:
+    """The runs of the scene in which errors are regular, for the first screen."""
+    rows = [row for row in result.rows if row.scene == result.regular]
+    figure = draw(rows, result.floors[result.regular], result.unit, SIZE)
+    return "overview_times", figure, result.finding("overview_caption", **uses)

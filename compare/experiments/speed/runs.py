@@ -1,10 +1,9 @@
-"""The runs of each scene by each method and setting: errors, times, and the error that rounding leaves."""
+"""The table of runs: scene, engine, method and setting; error and time of each. And the error that rounding leaves."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,38 +14,44 @@ from ...core import timing
 from ...core.check import Result
 from ...core.rows import MOVEMENT, MovementRow, column
 from ...engines import GRID, IN_QUICK_RUNS, Dynamics, Engine, Method, Setting
+from ...engines.outside.file import EngineError, TooLong
 from ...judge.rounding import growth
 from ...judge.run import diverged_at, movement_unit
 from ...judge.scale import EPS
 from ...robots.case import Case
 from ...truth.reference import Reference, coarsest_steps, reference
-from ..followed import follow
-from .settings import MOST_SECONDS, estimated, methods, settings_of
+from .settings import budget, methods, settings_of
 
-NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
+NEAR = 1.0  # rad or m: a run whose largest error is smaller has not diverged
+EARLY = 1.0  # s: until then chaos has not grown, and errors fall regularly
 GROWTH_STEPS = 16  # of the run whose growth is computed, between two recorded times
 EACH_STEP = 12  # nv up to which the growth takes the Jacobian of every step, not of one in GROWTH_STEPS
-TimedCall = tuple[Callable[[], object], float]  # a run takes this many times as long as the call
-FIRST_STEPS = 512  # a longer run of MuJoCo is timed over its first steps only
+FIRST_STEPS = 512  # a longer run of MuJoCo or tmt is timed over its first steps only
+ROUNDS = 5  # of timing in turns
+Settings = Mapping[Method, Sequence[Setting]]  # from coarse to fine
 
 
-@dataclass
-class SpeedRow(MovementRow):
+@dataclass(kw_only=True)
+class RunRow(MovementRow):
     """One run of a method in a scene, or why there is none."""
 
     scene: str
     engine: str
     method: str
+    scheme: str = ""  # methods of the same scheme differ only by rounding
+    order: int | None = None
     dt: float | None = column("s", digits=5, default=None)
     tolerance: float | None = None
     steps: int | None = None
-    timed_steps: int | None = None
+    timed_steps: int | None = None  # fewer than steps: the time is extrapolated
     evaluations: int | None = None
-    seconds: float | None = None
+    seconds: float | None = None  # of the engine's own steps
+    compile_seconds: float | None = None  # until the first run of the method could begin
     error: float | None = column(MOVEMENT, default=None)  # at the end
     worst_error: float | None = column(MOVEMENT, default=None)
+    early_error: float | None = column(MOVEMENT, default=None)  # the largest of the first second
     energy_error: float | None = column("J", default=None)
-    diverged: bool | None = None
+    ended: str | None = None  # why it did not reach the end
     why_not: str | None = None
 
     @property
@@ -56,20 +61,15 @@ class SpeedRow(MovementRow):
 
     @property
     def largest_error(self) -> float:
-        """The worst error of the run, rad or m; infinite if it diverged."""
+        """The worst error of the run, rad or m; infinite if it diverged or is none."""
         return math.inf if self.worst_error is None else self.worst_error
 
-
-class Run(NamedTuple):
-    method: Method
-    setting: Setting
-    early: float  # rad or m: the largest error of the first second
-    row: SpeedRow
-
     @property
-    def dt(self) -> float:
-        """The step, s; not a number for a method that chooses its own."""
-        return math.nan if self.row.dt is None else self.row.dt
+    def extrapolated(self) -> bool:
+        return self.timed_steps is not None and self.timed_steps != self.steps
+
+    def setting(self, duration: float) -> Setting:
+        return Setting(duration, None if self.tolerance else self.steps, self.tolerance)
 
 
 @dataclass
@@ -77,13 +77,7 @@ class SceneRuns:
     case: Case
     reference: Reference
     floor: float  # rad or m: the error that rounding, or the reference, leaves
-    runs: list[Run] = field(default_factory=list)
-
-    @cached_property
-    def energy(self) -> np.ndarray:
-        """The energy of the reference, J, (65,)."""
-        nq = self.case.coordinates.nq
-        return tmt.energy(self.reference.high[:, :nq], self.reference.high[:, nq:], self.case.tree)
+    rows: list[RunRow] = field(default_factory=list)
 
 
 @dataclass
@@ -95,53 +89,97 @@ class SpeedResult(Result):
 
 
 def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRuns:
-    """The runs of a scene by compiled methods, which are not yet timed."""
+    """The runs of a scene by compiled methods, whose times are taken later."""
     exact = reference(case)
     scene = SceneRuns(case, exact, max(floor(case, engines["tmt"].of(case)), exact.apart))
-    scene.runs = runs_of(scene, engines, size, compiled=True)
-    for run in scene.runs:
-        run.row.seconds = None
+    scene.rows = rows_of(scene, engines, size, compiled=True)
+    for row in scene.rows:
+        row.seconds = None
     return scene
 
 
-def runs_of(scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool) -> list[Run]:
-    """The runs by methods whose loop is compiled, or by the others."""
-    every = methods(engines, size, scene.case)
+def rows_of(scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled: bool) -> list[RunRow]:
+    """Rows of the methods whose loop is compiled here, or of the others, each of whose runs is timed."""
+    case, every = scene.case, methods(engines, size, scene.case)
     some = [method for method in every if (method.engine in IN_QUICK_RUNS) == compiled]
-    return [run for method in some for run in series(scene, engines[method.engine], method, size)]
+    settings = {method: settings_of(method, case, size) for method in some}
+    if compiled:
+        rows = measure(case, engines, settings, scene.reference)
+    else:
+        seconds = max((budget(method, case.robot, size).seconds for method in some), default=0.0)
+        rows = measure(case, engines, settings, scene.reference, seconds)
+    for row in rows:
+        if scene.reference.why and row.worst_error is not None:  # a smaller error is not known
+            least = scene.floor
+            row.error, row.worst_error = max(row.error or 0.0, least), max(row.worst_error, least)
+            row.early_error = max(row.early_error or 0.0, least)
+    return rows
 
 
-def series(scene: SceneRuns, engine: Engine, method: Method, size: str) -> Iterator[Run]:
-    """The runs of a method from coarse to fine, until one takes too long or gains nothing."""
-    best, last, seconds = math.inf, 0, estimated(method, scene.case.tree)
-    for setting in settings_of(method, scene.case, size):
-        run = measured(scene, engine, method, setting)
-        yield run
-        error, work = run.row.largest_error, run.row.evaluations or run.row.steps or 2 * last + 1
-        too_long = method.adaptive and work * seconds > MOST_SECONDS[size] / 2
-        if too_long or gained_nothing(error, work, best, last, scene.floor):
-            return
-        best, last = min(best, error), work
+def measure(
+    case: Case, engines: Mapping[str, Engine], settings: Settings, reference: Reference,
+    budget: float = math.inf,
+) -> list[RunRow]:  # fmt: skip
+    """Rows of all methods and settings, with the errors of each run and its time, taken once.
+
+    budget: s; a method has no finer run after one that takes longer. A method that its engine does not run is
+    one row with the reason; an engine that gives no answer in time is not asked again.
+    """
+    rows: list[RunRow] = []
+    silent: dict[str, str] = {}  # engines, and why
+    nq = case.coordinates.nq
+    energy = tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    for method, of_method in settings.items():
+        for setting in of_method:
+            try:
+                if method.engine in silent:
+                    raise EngineError(silent[method.engine])
+                rows.append(measured(case, engines[method.engine], method, setting, reference, energy))
+            except EngineError as error:
+                if isinstance(error, TooLong):
+                    silent[method.engine] = str(error)
+                rows.append(row_of(case, method, why_not=str(error).rstrip(".")))
+                break
+            if rows[-1].time > budget:
+                break
+    return rows
 
 
-def gained_nothing(error: float, work: int, best: float, last: int, floor: float) -> bool:
-    """Whether a run that cost more is not more exact, when the best error is already near rounding."""
-    return best < NEAR_ROUNDING * floor and work > 1.2 * last and not error < 0.7 * best
+def row_of(case: Case, method: Method, **values: object) -> RunRow:
+    """A row of a method in a case."""
+    about = {"scene": case.name, "engine": method.engine, "method": method.name, "scheme": method.scheme}
+    unit = movement_unit(case.coordinates)
+    return RunRow(**about, order=method.order, unit=unit, **values)  # type: ignore[arg-type]
 
 
-def measured(scene: SceneRuns, engine: Engine, method: Method, setting: Setting) -> Run:
-    """One run. With a reference in doubles, errors below the floor of the scene are set to it."""
-    case, reference = scene.case, scene.reference
-    motion, seconds, errors, early, _ = follow(engine.of(case), case, method, setting, reference)
-    least, unit = scene.floor if reference.why else 0.0, movement_unit(case.robot.coordinates)
-    dt = setting.duration / setting.steps if setting.steps else None
-    row = SpeedRow(case.name, method.engine, method.name, dt, setting.tolerance, motion.steps, unit=unit)
-    row.timed_steps, row.evaluations, row.seconds = motion.steps, motion.evaluations, seconds
-    row.diverged = diverged_at(case, reference.t, motion.q, motion.v) is not None
-    if not row.diverged:
-        row.error, row.worst_error = max(float(errors[-1]), least), max(float(errors.max()), least)
-        row.energy_error = float(np.abs(tmt.energy(motion.q, motion.v, case.tree) - scene.energy).max())
-    return Run(method, setting, max(early, least), row)
+def measured(
+    case: Case, engine: Engine, method: Method, setting: Setting, reference: Reference, energy: np.ndarray
+) -> RunRow:
+    """The row of one run: errors of positions and of the energy, J, at 65 equal times, and its time."""
+    dynamics = engine.of(case)
+    with np.errstate(all="ignore"):  # in a run that diverges
+        begin = time.perf_counter()
+        run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
+        prepared = time.perf_counter() - begin
+        begin = time.perf_counter()
+        outcome = run()
+        seconds = time.perf_counter() - begin
+        motion = read(outcome)
+        errors = reference.error(motion.q)
+        is_near = errors.max() <= NEAR  # then it has the energy of the reference, about
+        at = None if is_near else diverged_at(case, reference.t, motion.q, motion.v)
+    row = row_of(case, method, tolerance=setting.tolerance, evaluations=motion.evaluations)
+    row.dt = setting.duration / setting.steps if setting.steps else None
+    row.steps = setting.steps or motion.steps
+    row.seconds = next(s for s in (motion.seconds_alone, motion.seconds, seconds) if s is not None)
+    row.compile_seconds = getattr(dynamics, "seconds_prepared", None) or prepared
+    if at is not None:
+        row.ended = str(motion.ended or f"diverged at {at:.2g} s")
+        return row
+    row.error, row.worst_error = float(errors[-1]), float(errors.max())
+    row.early_error = float(errors[reference.t <= EARLY].max())
+    row.energy_error = float(np.abs(tmt.energy(motion.q, motion.v, case.tree) - energy).max())
+    return row
 
 
 def floor(case: Case, dynamics: Dynamics) -> float:
@@ -162,21 +200,24 @@ def floor(case: Case, dynamics: Dynamics) -> float:
     raise ValueError(f"{reached}; expected a shorter scene")
 
 
-def prepared(case: Case, runs: Sequence[Run], engines: Mapping[str, Engine]) -> list[TimedCall]:
-    """The calls by which runs are timed, and for each how many times as long the run takes."""
-    calls = []
-    for method, setting, *_ in runs:
-        part, steps = setting, setting.steps or 0
-        if method.engine == "mujoco" and steps > FIRST_STEPS:  # each of its steps costs the same
-            part = Setting(setting.duration * FIRST_STEPS / steps, FIRST_STEPS)
-        call, _ = engines[method.engine].of(case).prepare(*case.start, case.tau, part, method.name)
-        calls.append((call, setting.duration / part.duration))
-    return calls
+def prepared(case: Case, row: RunRow, engines: Mapping[str, Engine]) -> tuple[Callable[[], object], float]:
+    """A call by which a run is timed, and how many times as long the run takes."""
+    setting = part = row.setting(case.duration)
+    if row.engine in IN_QUICK_RUNS and (setting.steps or 0) > FIRST_STEPS:  # each of its steps costs the same
+        part = Setting(case.duration * FIRST_STEPS / (setting.steps or 1), FIRST_STEPS)
+    call, _ = engines[row.engine].of(case).prepare(*case.start, case.tau, part, row.method)
+    return call, setting.duration / part.duration
 
 
-def take_times(runs: Sequence[Run], calls: Sequence[TimedCall]) -> None:
-    """Set the seconds of runs to the least of their times; their calls are timed in turns."""
-    times = timing.in_turns([call for call, _ in calls], rounds=5)
-    for run, (_, factor), seconds in zip(runs, calls, times):
-        run.row.seconds = factor * min(seconds)
-        run.row.timed_steps = run.row.steps and round(run.row.steps / factor)
+def take_times(case: Case, rows: Sequence[RunRow], engines: Mapping[str, Engine]) -> None:
+    """Set the seconds of rows to the least of their times; their runs take turns."""
+    calls = [prepared(case, row, engines) for row in rows]
+    for row, (_, factor), seconds in zip(rows, calls, timing.in_turns([call for call, _ in calls], ROUNDS)):
+        row.seconds = factor * min(seconds)
+        row.timed_steps = row.steps and round(row.steps / factor)
+
+
+def same_scheme(rows: Sequence[RunRow], row: RunRow) -> RunRow | None:
+    """tmt's run with the scheme and the step of a row, or None."""
+    twins = (one for one in rows if (one.scene, one.engine, one.method) == (row.scene, "tmt", row.scheme))
+    return next((twin for twin in twins if row.dt and twin.dt == row.dt), None)

@@ -1,6 +1,7 @@
 """What is run: scenes, methods of the available engines, steps or tolerances of each method."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from tmt import Tree
 from tmt.methods import method_named
@@ -11,22 +12,80 @@ from ...robots.case import Case
 from ...truth.reference import coarsest_steps
 
 # steps; more would take too long
-FINEST = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}
-FINEST_OTHERS = 2**15  # of other engines, and of methods that solve their stages
+FINEST, FINEST_OTHERS = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}, 2**15
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
     "dopri8_adaptive": (2, 14), "RK45": (2, 10), "DOP853": (2, 13), "Radau": (2, 4), "LSODA": (2, 12),
-    "Taylor": (4, 16),
+    "Taylor": (4, 16), "RK3 adaptive": (2, 9), "Radau3 adaptive": (2, 7),
 }  # fmt: skip
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
-# A robot from a file may have any number of joints. Seconds of one evaluation are about a constant times
-# nv^1.5; an engine that is called from Python adds those of a call and of the solver's own work:
+LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
+# seconds of the finest run of a method; of a method whose coarsest run takes longer there is none; and after which
+# a method of a called engine has no finer run
+MOST_SECONDS, SLOWEST_RUN, LONGEST_CALLED = {"full": 0.3, "quick": 0.1, "small": 0.1}, 0.6, 0.2
+# A robot may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5; an engine
+# that is called from Python adds those of a call and of the solver's own work:
 SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
-MOST_SECONDS = {"full": 0.6, "quick": 0.1, "small": 0.1}  # estimated, of the finest run of a method
-LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
 QUICK_SPEEDS = 4  # nv up to which a quick run has methods that solve their stages
-SLOWEST_RUN = 0.6  # s, estimated: a method whose coarsest run takes longer is left out
+
+
+class Budget(NamedTuple):
+    """What a run of a method may take. steps, settings: at most; why_not: the reason why there is no run."""
+
+    settings: int = 0
+    steps: int = 0
+    seconds: float = 0.0  # a method of a called engine has no finer run after one that takes longer
+    why_not: str = ""
+
+
+def budget(method: Method, robot: Robot, size: str) -> Budget:
+    """The budget of a method for a robot in a run of this size, from estimated times of its steps."""
+    case, n, most = regular_of(robot), robot.coordinates.nv, MOST_SECONDS[size]
+    finest = FINEST.get((method.engine, method.name), FINEST.get(method.engine, FINEST_OTHERS))
+    settings = FEW_SETTINGS.get(size, finest)
+    if size != "full" and method.engine not in IN_QUICK_RUNS:
+        settings = FEW_OTHERS
+    if method.adaptive or RECORDS[method.engine].reads_file:  # whose runs are timed one by one
+        return Budget(settings, finest, LONGEST_CALLED)
+    step, solves = estimated(method, case.tree), solves_stages(method)
+    if robot.is_read and (seconds := coarsest_steps(case) * step) > SLOWEST_RUN:
+        return Budget(why_not=f"with {n} speeds its coarsest run would take about {seconds:.1g} s")
+    if robot.is_read and size == "quick" and n > QUICK_SPEEDS and solves:
+        return Budget(why_not=f"with {n} speeds its code takes too long to compile for a quick run")
+    least = coarsest_steps(case) << (LEAST_SETTINGS[size] - 1)
+    return Budget(settings, max(min(finest, int(most / step)), least), LONGEST_CALLED)
+
+
+def solves_stages(method: Method) -> bool:
+    return method.engine == "tmt" and method_named(method.name).solves_stages
+
+
+def estimated(method: Method, tree: Tree) -> float:
+    """Approximate seconds of a step."""
+    n = tree.coordinates.nv
+    is_called = method.engine not in SECONDS
+    evaluation = SECONDS.get(method.engine, SECONDS["tmt"]) * n**1.5 + CALL_SECONDS * is_called
+    if method.engine == "mujoco":
+        return evaluation * (4 if method.name == "RK4" else 1)
+    if method.engine != "tmt":
+        return evaluation
+    stepping = method_named(method.name)
+    if stepping.solves_stages:
+        return evaluation * stepping.stages**2 * n * ITERATIONS
+    return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
+
+
+def settings_of(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
+    """The settings of a method within its budget, from coarse to fine: the scene's own step, halved; tolerances / 10."""
+    allowed, coarsest = budget(method, case.robot, size), coarsest_steps(case)
+    if method.adaptive:
+        first, last = EXPONENTS.get(method.name, (2, 10))
+        settings = [Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1)]
+    else:
+        halved = (allowed.steps // coarsest).bit_length()
+        settings = [Setting(case.duration, steps=coarsest << k) for k in range(halved)]
+    return tuple(settings[: allowed.settings])
 
 
 def scenes_of(robot: Robot) -> list[Case]:
@@ -54,16 +113,21 @@ def followed(robot: Robot, size: str) -> list[Case]:
 
 
 def asked(engines: Mapping[str, Engine], size: str) -> list[Engine]:
-    """The engines that follow a scene; the experiment `engines` compares those that read the file."""
+    """The engines of a run that integrate: in a quick one MuJoCo and tmt, in a small one none that reads the file."""
     names = [name for name in engines if size != "quick" or name in IN_QUICK_RUNS]
-    return [engines[name] for name in names if not RECORDS[name].reads_file]
+    chosen = [engines[name] for name in names if size == "full" or not RECORDS[name].reads_file]
+    return [engine for engine in chosen if engine.methods]
 
 
 def methods(engines: Mapping[str, Engine], size: str, case: Case) -> list[Method]:
-    """The methods by which a case is followed. Where the robot's actuators act, some have other schemes."""
-    excluded = left_out(engines, size, case.robot)
-    candidates = [method for engine in asked(engines, size) for method in methods_in(engine, case).values()]
-    return [method for method in candidates if (method.engine, method.name) not in excluded]
+    """The methods by which a case is followed. Where the robot's actuators act, some have other schemes.
+
+    Engines that read the file follow the regular scene alone: each of their runs is timed.
+    """
+    excluded, is_regular = left_out(engines, size, case.robot), case.name == regular_of(case.robot).name
+    able = [engine for engine in asked(engines, size) if is_regular or not RECORDS[engine.name].reads_file]
+    found = [method for engine in able if not engine.unavailable() for method in methods_in(engine, case).values()]
+    return [method for method in found if (method.engine, method.name) not in excluded]
 
 
 def left_out(engines: Mapping[str, Engine], size: str, robot: Robot) -> dict[tuple[str, str], str]:
@@ -73,58 +137,6 @@ def left_out(engines: Mapping[str, Engine], size: str, robot: Robot) -> dict[tup
         too_long = getattr(engine, "too_long", lambda tree: None)
         of_engine = engine.unavailable() or too_long(robot.tree)
         for method in engine.methods.values():
-            if reason := of_engine or too_slow(method, robot, size):
+            if reason := of_engine or budget(method, robot, size).why_not:
                 reasons[engine.name, method.name] = reason
     return reasons
-
-
-def too_slow(method: Method, robot: Robot, size: str) -> str | None:
-    """Why a method is left out for a robot of many joints; None: it is not."""
-    if not robot.is_read or method.adaptive:
-        return None
-    case, n = regular_of(robot), robot.coordinates.nv
-    seconds = coarsest_steps(case) * estimated(method, case.tree)
-    if seconds > SLOWEST_RUN:
-        return f"with {n} speeds its coarsest run would take about {seconds:.1g} s"
-    is_large = size == "quick" and n > QUICK_SPEEDS
-    if is_large and method.engine == "tmt" and method_named(method.name).solves_stages:
-        return f"with {n} speeds its code takes too long to compile for a quick run"
-    return None
-
-
-def estimated(method: Method, tree: Tree) -> float:
-    """Approximate seconds of a step, or of an evaluation of a method with adaptive steps."""
-    n = tree.coordinates.nv
-    is_called = method.engine not in SECONDS
-    evaluation = SECONDS.get(method.engine, SECONDS["tmt"]) * n**1.5 + CALL_SECONDS * is_called
-    if method.engine == "mujoco":
-        return evaluation * (4 if method.name == "RK4" else 1)
-    if method.engine != "tmt" or method.adaptive:
-        return evaluation
-    stepping = method_named(method.name)
-    if stepping.solves_stages:
-        return evaluation * stepping.stages**2 * n * ITERATIONS
-    return evaluation * stepping.stages * (n if getattr(stepping, "implicit_bias", False) else 1)
-
-
-def settings_of(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
-    """The settings of a method, from coarse to fine: steps are halved, tolerances divided by ten."""
-    first, last = EXPONENTS.get(method.name, (2, 12))
-    settings = tuple(Setting(case.duration, tolerance=10.0**-k) for k in range(first, last + 1))
-    if not method.adaptive:
-        settings = halvings(method, case, size)
-    few = FEW_SETTINGS.get(size)
-    return settings[: FEW_OTHERS if few and method.engine not in IN_QUICK_RUNS else few]
-
-
-def halvings(method: Method, case: Case, size: str = "full") -> tuple[Setting, ...]:
-    """The scene's own step, halved repeatedly."""
-    count = coarsest_steps(case)
-    solves = method.engine == "tmt" and method_named(method.name).solves_stages
-    of_engine = FINEST.get(method.engine, FINEST_OTHERS)
-    finest = FINEST_OTHERS if solves else FINEST.get((method.engine, method.name), of_engine)
-    if case.robot.is_read:
-        affordable = int(MOST_SECONDS[size] / estimated(method, case.tree))
-        finest = max(min(finest, affordable), count << (LEAST_SETTINGS[size] - 1))
-    halved = max(1, (finest // count).bit_length())
-    return tuple(Setting(case.duration, steps=count << k) for k in range(halved))
