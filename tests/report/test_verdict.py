@@ -16,7 +16,7 @@ from compare.experiments import module
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import conclusions
-from compare.experiments.speed.runs import SpeedResult, SpeedRow
+from compare.experiments.speed.runs import RunRow, SpeedResult
 from compare.experiments.stability.tables import LimitRow, StabilityResult
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
@@ -178,7 +178,8 @@ def test_first_screen_of_several_experiments_has_the_answers_alone():
 
 
 def timed(engine, method, seconds, error, **more):
-    return SpeedRow("s", engine, method, seconds=seconds, worst_error=error, **{"diverged": False} | more)
+    about = {"scene": "s", "engine": engine, "method": method, "seconds": seconds, "worst_error": error}
+    return RunRow(**about | more)
 
 
 def marks(experiment, result, robot=ARM):
@@ -192,13 +193,12 @@ def marks(experiment, result, robot=ARM):
 def test_a_curve_has_what_nothing_of_the_same_engine_beats_and_its_cheapest_is_named():
     rows = [
         timed("tmt", "rk4", 1e-3, 1e-3), timed("tmt", "rk4", 2e-3, 1e-2), timed("tmt", "dopri8", 4e-3, 1e-6),
-        timed("tmt", "dopri8", 5e-3, 1e-9), timed("mujoco", "RK4", 1e-2, 1.1e-6), timed("tmt", "rk4", 1e-9, None, diverged=True),
-        timed("tmt", "rk4", 1e-9, 2.0), timed("heyoka", "Taylor", None, None, why_not="absent"),
+        timed("tmt", "dopri8", 5e-3, 1e-9), timed("mujoco", "RK4", 1e-2, 1.1e-6),
+        timed("tmt", "rk4", 1e-9, None, ended="diverged"), timed("tmt", "rk4", 1e-9, 2.0),
+        timed("heyoka", "Taylor", None, None, why_not="absent"),
     ]  # fmt: skip
-    result = SpeedResult("speed", rows=rows, regular="s")
-    assert conclusions.best_rows(result) == {"tmt": [rows[0], rows[2], rows[3]], "mujoco": [rows[4]]}
-    assert conclusions.reaching(rows[4:5], conclusions.TARGET) == []  # just outside of the error asked for
-    rows.append(timed("mujoco", "RK4", 3e-3, 1e-6, dt=0.00244140625, steps=2048))
-    rows.append(timed("scipy", "DOP853", 4.5e-3, 1e-7))  # which is not the cheapest beside MuJoCo
-    assert conclusions.cheapest_settings(result)["settings"] == [rows[-2], rows[2]]
-    assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1e-6)} <= marks("speed", result)
+    of_tmt = [row for row in rows if row.engine == "tmt"]
+    assert conclusions.front(of_tmt) == [rows[0], rows[2], rows[3]]
+    result = SpeedResult("speed", rows=rows, regular="s", floors={"s": 1e-15})
+    result.tables["what_should_i_use"] = conclusions.what_to_use(result)
+    assert {("o", to_hex(BLUE), 1e-6), ("s", to_hex(ORANGE), 1.1e-6)} <= marks("speed", result)

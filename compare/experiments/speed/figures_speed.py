@@ -23,7 +23,8 @@ def draw(rows: Sequence[RunRow], floor: float, unit: str, size: tuple[float, flo
     fig = Figure(figsize=size, layout="constrained")
     ax = fig.subplots()
     for engine in LABELS:
-        of_engine = [row for row in rows if row.engine == engine and row.largest_error <= COARSE_END]
+        timed = [row for row in rows if row.engine == engine and row.seconds]
+        of_engine = [row for row in timed if row.largest_error <= COARSE_END]
         if not (best := front(of_engine)):
             continue
         look = {"color": COLOURS[engine], "marker": MARKS[engine]}

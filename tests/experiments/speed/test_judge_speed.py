@@ -5,26 +5,41 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from compare.core.rows import Row
-from compare.core.text import say
-from compare.engines import Method, Setting
+from compare.core.text import say, screen
+from compare.engines import GRID, Method, Motion, Setting
+from compare.engines.outside.file import EngineError, TooLong
+from compare.experiments import speed
 from compare.experiments.speed import conclusions, evaluations, runs
-from compare.experiments.speed.runs import Run, SceneRuns, SpeedResult, SpeedRow
+from compare.experiments.speed.runs import RunRow, SceneRuns, SpeedResult
+from compare.robots.arm import ARM
+from compare.truth.reference import reference
 
 SCHEMES = {"RK4": "rk4", "implicit": "implicit", "Euler": "semi_implicit_euler"}
 COMPARED = "smallest error of MuJoCo's RK4, compared with tmt's rk4"
 STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 
 
-def run_of(engine, method, error, steps=64, seconds=1e-3) -> Run:
+def run_of(engine, method, error, steps=64, seconds=1e-3, **more) -> RunRow:
     """A run: diverged where the error is None."""
-    numbers = dict.fromkeys(("error", "worst_error", "energy_error"), error) | {"seconds": seconds}
-    row = SpeedRow("bent, free", engine, method, 5.0 / steps, None, steps, steps, 4 * steps, **numbers)
-    row.diverged = error is None
-    return Run(Method(engine, method, 4, SCHEMES.get(method, method)), Setting(5.0, steps), error, row)
+    errors = dict.fromkeys(("error", "worst_error", "early_error", "energy_error"), error)
+    about = {
+        "scene": "bent, free",
+        "engine": engine,
+        "method": method,
+        "scheme": SCHEMES.get(method, method),
+        "order": 4,
+    }
+    numbers = {
+        "dt": 5.0 / steps,
+        "steps": steps,
+        "timed_steps": steps,
+        "evaluations": 4 * steps,
+        "seconds": seconds,
+    }
+    return RunRow(**about | errors | numbers | {"ended": None if error else "diverged"} | more)
 
 
-def series(engine, method, errors) -> list[Run]:
+def series(engine, method, errors) -> list[RunRow]:
     """A run for each error, from coarse to fine."""
     return [run_of(engine, method, error, 64 << k) for k, error in enumerate(errors)]
 
@@ -38,11 +53,6 @@ def judged(check, found, floor) -> dict[str, bool]:
     result = SpeedResult("speed")
     check(result, scene_of(found, floor))
     return {check.quantity: check.passed for check in result.checks}
-
-
-def advised(found) -> list[Row]:
-    rows = [run.row for run in found]
-    return conclusions.advice(SpeedResult("speed", rows=rows, floors={"bent, free": 1e-16}))
 
 
 @pytest.mark.parametrize("ours, theirs, verdict", [
@@ -115,33 +125,126 @@ def test_a_higher_order_is_said_and_fails_only_where_tmts_same_scheme_has_anothe
     assert ("with order 5.00 (stated: 4)" in said) == bool(higher)
 
 
-def test_the_advice_names_the_cheapest_of_each_engine_with_its_time():
+def result_of(rows) -> SpeedResult:
+    result = SpeedResult("speed", rows=rows, floors={"bent, free": 1e-16}, regular="bent, free")
+    result.tables["what_should_i_use"] = conclusions.what_to_use(result)
+    return result
+
+
+def many_runs() -> list[RunRow]:
     """MuJoCo's RK4 20 times slower than tmt's; of its integrators Euler is never as near; dopri8 needs fewest steps."""
-    found = [run_of("scipy", "DOP853", 1e-9, 500, 1e-4), run_of("mujoco", "implicit", None, 64, 1e-9)]
+    found = [run_of("scipy", "DOP853", 1e-9, 500, 1e-4, dt=None, tolerance=1e-7)]
+    found.append(run_of("mujoco", "implicit", None, 64, 1e-9))
     for k in range(5):
-        steps, error = 64 << k, 2e-2 / 16**k
-        found.append(run_of("mujoco", "RK4", error, steps, 20e-3 * 2**k))
-        found.append(run_of("tmt", "rk4", error, steps, 1e-3 * 2**k))
-        found.append(run_of("mujoco", "Euler", 0.5 / 2**k, steps, 4e-3 * 2**k))
-        found.append(run_of("tmt", "dopri8", error**2, steps, 2e-3 * 2**k))
-    table = {row.target: row for row in advised(found)}
-    row = table[1e-3]
-    settings = "mujoco RK4, 256 steps", "tmt dopri8, 64 steps", "scipy DOP853, 500 steps"
-    assert (row.mujoco, row.tmt, row.of_all) == settings
-    assert (row.mujoco_ms, row.tmt_ms, row.of_all_ms) == pytest.approx((80.0, 2.0, 0.1))
-    assert row.mujoco_evaluations == 1024
-    parts = row.ratio, row.integrator_part, row.kernel_part, row.method_part
-    assert parts == pytest.approx((40.0, 1.0, 20.0, 2.0))
-    assert table[1e-12].mujoco == "none" and table[1e-12].mujoco_ms is None
+        steps, error, seconds = 64 << k, 2e-2 / 16**k, 1e-3 * 2**k
+        found.append(run_of("mujoco", "RK4", error, steps, 20 * seconds, timed_steps=min(steps, 512)))
+        found.append(run_of("tmt", "rk4", error, steps, seconds))
+        found.append(run_of("mujoco", "Euler", 0.5 / 2**k, steps, 4 * seconds))
+        found.append(run_of("tmt", "dopri8", error**2, steps, 2 * seconds))
+    return found
 
 
-def test_the_gain_is_that_of_the_integrator_times_that_of_the_kernel_times_that_of_the_method():
-    timed = ("mujoco", "RK4", 8e-3), ("mujoco", "Euler", 2e-3), ("tmt", "rk4", 4e-3), ("tmt", "dopri8", 1e-3)
-    row = advised([run_of(engine, method, 1e-4, 64, seconds) for engine, method, seconds in timed])[0]
-    parts = row.integrator_part, row.kernel_part, row.method_part
-    assert parts == pytest.approx((0.25, 2.0, 4.0)) and row.ratio == pytest.approx(np.prod(parts))
-    adaptive = conclusions.setting("tmt", SpeedRow("s", "tmt", "dopri8_adaptive", None, 1e-9, 17))
-    assert "1e-09" in adaptive["tmt"] and "17" not in adaptive["tmt"]
+def test_the_cheapest_setting_of_each_engine_for_an_error():
+    table = result_of(many_runs()).tables["what_should_i_use"]
+    of_targets = {target: [row for row in table if row.target == target] for target in (1e-3, 1e-6, 1e-9)}
+    coarse, middle, fine = of_targets.values()
+    assert [(row.engine, row.method, row.steps, row.ms) for row in coarse] == [
+        ("scipy", "DOP853", 500, pytest.approx(0.1)), ("tmt", "dopri8", 64, pytest.approx(2.0)),
+        ("mujoco", "RK4", 256, pytest.approx(80.0)),
+    ]  # fmt: skip
+    assert [row.over_cheapest for row in coarse] == pytest.approx([1.0, 20.0, 800.0])
+    assert [row.over_same_scheme for row in coarse] == [None, 1.0, pytest.approx(20.0)]
+    assert [row.energy_error for row in coarse] == pytest.approx([1e-9, 4e-4, 2e-2 / 256])
+    assert [row.extrapolated for row in middle] == [False, False, True]  # 1024 steps, of which 512 are timed
+    assert (fine[-1].engine, fine[-1].method, fine[-1].ms) == ("mujoco", None, None)  # no setting reaches it
+
+
+@pytest.mark.parametrize(
+    "error, target, reaches", [(1e-6, 1e-6, True), (1.01e-6, 1e-6, False), (None, 1.0, False)]
+)
+def test_a_run_reaches_an_error_that_is_not_smaller_than_its_own(error, target, reaches):
+    rows = [
+        run_of("tmt", "rk4", error),
+        run_of("tmt", "dopri8", 1e-9, seconds=None),
+    ]  # the latter is not timed
+    assert (conclusions.cheapest(rows, target) is rows[0]) is reaches
+    assert conclusions.cheapest(rows, target, engine="mujoco") is None
+
+
+def test_the_first_screen_has_the_cheapest_of_each_engine_and_says_what_is_extrapolated():
+    result = result_of(many_runs())
+    values = speed.uses(result)
+    first, _, head, *table, last = screen(result.finding("answer", **values))
+    assert [*values["cheapest"]] == ["SciPy", "TMT", "MuJoCo"] and "DOP853, tolerance 1e-07, 0.1 ms" in first
+    assert "about 320 ms" in first and "bent, free" in first
+    cells = {line.split()[0]: line.split("  ")[1:] for line in table}
+    assert [*cells] == ["SciPy", "TMT", "MuJoCo"] and head.split()[-3:] == ["1e-3", "1e-6", "1e-9"]
+    assert "RK4 80 ms" in table[2] and "RK4 ~320 ms" in table[2] and table[2].endswith("-") and "512" in last
+    whole = result_of([row for row in many_runs() if not row.extrapolated])
+    assert "extrapolated" not in " ".join(screen(whole.finding("answer", **speed.uses(whole))))
+    none = result_of([run_of("mujoco", "Euler", 0.1)])
+    assert "no setting" in say(none.finding("headline", **speed.uses(none)))
+
+
+class Slow:
+    """An engine whose runs take so long, s, or that refuses methods by their names."""
+
+    def __init__(self, seconds=(), refused=None):
+        self.seconds, self.refused, self.asked = seconds, refused or {}, []
+
+    def of(self, case):
+        return self
+
+    def prepare(self, q, v, tau, setting, method):
+        self.asked.append((method, setting.steps))
+        if method in self.refused:
+            raise self.refused[method]
+        states = np.tile(q, (GRID + 1, 1)), np.tile(v, (GRID + 1, 1))
+        motion = Motion(np.linspace(0.0, 5.0, GRID + 1), *states, seconds_alone=self.seconds[setting.steps])
+        return lambda: None, lambda _: motion
+
+
+HELD = next(case for case in ARM.cases if case.name == "zero, free")
+KNOWN = reference(HELD)
+
+
+def measured(engine, *methods, budget=np.inf):
+    settings = {
+        Method("drake", name, 4, name): [Setting(5.0, steps) for steps in (64, 128, 256)] for name in methods
+    }
+    return runs.measure(HELD, {"drake": engine}, settings, KNOWN, budget)
+
+
+@pytest.mark.parametrize("budget, steps", [(0.11, [64, 128]), (0.13, [64, 128, 256])])
+def test_after_a_run_beyond_the_budget_there_is_no_finer_one(budget, steps):
+    rows = measured(Slow({64: 0.06, 128: 0.12, 256: 0.24}), "RK4", budget=budget)
+    assert [row.steps for row in rows] == steps and rows[0].seconds == 0.06
+    stays = KNOWN.error(np.tile(HELD.q, (GRID + 1, 1)))
+    assert rows[0].worst_error == pytest.approx(stays.max()) and rows[0].error == pytest.approx(stays[-1])
+    assert rows[0].early_error == pytest.approx(stays[:13].max())  # up to 12 / 64 of 5 s
+    assert rows[0].energy_error < 1e-9  # of a motion without damping
+
+
+def test_a_method_that_an_engine_refuses_is_a_row_and_an_engine_without_an_answer_is_not_asked_again():
+    seconds = dict.fromkeys((64, 128, 256), 1e-3)
+    some = Slow(seconds, {"RK2": EngineError("it lacks a number.")})
+    rows = measured(some, "RK2", "RK4")
+    assert [(row.method, row.why_not) for row in rows] == [("RK2", "it lacks a number"), *[("RK4", None)] * 3]
+    none = Slow(seconds, {"RK2": TooLong("no answer within 1 s")})
+    rows = measured(none, "RK2", "RK4")
+    assert [(row.method, row.why_not) for row in rows] == [
+        (name, "no answer within 1 s") for name in ("RK2", "RK4")
+    ]
+    assert none.asked == [("RK2", 64)]
+
+
+def test_compilation_is_the_sum_of_the_methods_of_an_engine():
+    rows = [run_of("mjx", "RK4", 1e-3, compile_seconds=4.0), run_of("mjx", "RK4", 1e-4, compile_seconds=1e-5)]
+    rows += [
+        run_of("mjx", "Euler", 1e-3, compile_seconds=2.0),
+        run_of("mujoco", "RK4", 1e-3, compile_seconds=9e-3),
+    ]
+    assert speed.compilation(rows) == {"MJX": 6.0}
 
 
 def test_operations_per_nanosecond_are_those_of_a_state_over_its_time(monkeypatch):
@@ -153,7 +256,13 @@ def test_operations_per_nanosecond_are_those_of_a_state_over_its_time(monkeypatc
 
 
 def test_a_row_gets_the_least_of_its_times(monkeypatch):
-    found = [run_of("tmt", "rk4", 1.0), run_of("mujoco", "RK4", 1.0)]
+    found = [run_of("tmt", "rk4", 1.0), run_of("mujoco", "RK4", 1.0, 1024)]
+    monkeypatch.setattr(
+        runs, "prepared", lambda case, row, engines: (None, row.steps / 512 if row.steps > 512 else 1.0)
+    )
     monkeypatch.setattr(runs.timing, "in_turns", lambda calls, rounds: [[3e-3, 2e-3, 5e-3], [0.2]])
-    runs.take_times(found, [(None, 1.0), (None, 2.0)])
-    assert [run.row.seconds for run in found] == [2e-3, 0.4]
+    runs.take_times(HELD, found, {})
+    assert [(row.seconds, row.timed_steps, row.extrapolated) for row in found] == [
+        (2e-3, 64, False),
+        (0.4, 512, True),
+    ]

@@ -1,6 +1,7 @@
 """Speed against accuracy: who takes part, with which steps; runs and what they are measured against."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,7 +9,10 @@ from edited import XML, setup_of, setup_of_file, untimed_speed
 from models import PATHS
 
 import tmt
+from compare.core.text import say
+from compare.engines import RECORDS
 from compare.engines.heyoka import Heyoka
+from compare.engines.outside import Outside
 from compare.experiments import speed
 from compare.experiments.setup import Setup
 from compare.experiments.speed import runs, settings
@@ -21,6 +25,8 @@ OWN = Scene("my swing", (0, 0, 120), duration=2.0, dt=1 / 50, tags=("own",))
 MINE = dataclasses.replace(ARM, scenes=(*ARM.scenes, OWN))
 BENT = next(case for case in ARM.cases if case.name == "bent, free")  # in which errors fall regularly
 GRIPPER, HUMANOID, ARM7 = (setup_of_file(PATHS[name]) for name in ("gripper", "humanoid29_free", "arm7"))
+SLIDE = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="0 0 1" stiffness="40"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
 FREE, STEP = settings.scenes_of(GRIPPER.robot)
 
 
@@ -80,10 +86,11 @@ def test_rounding_leaves_eps_times_the_growth(engines):
 
 def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_bent, monkeypatch):
     ours, known = GRIPPER.engines["tmt"], reference.in_doubles(FREE)._replace(why="too stiff")
-    method = ours.methods["dopri8"]
-    scene, setting = runs.SceneRuns(FREE, known, 1e-11), settings.halvings(method, FREE)[1]
-    row = runs.measured(scene, ours, method, setting).row
-    assert row.worst_error == row.error == 1e-11 and not row.diverged
+    dopri8 = ours.methods["dopri8"]
+    monkeypatch.setattr(runs, "methods", lambda *_: [dopri8])
+    scene = runs.SceneRuns(FREE, known, 1e-11)
+    *_, row = runs.rows_of(scene, GRIPPER.engines, "small", compiled=True)
+    assert row.worst_error == row.error == row.early_error == 1e-11 and row.ended is None
     monkeypatch.setattr(runs, "methods", lambda *_: [])
     monkeypatch.setattr(runs, "reference", lambda case: of_bent.reference._replace(apart=1e-6))
     assert runs.scene_runs(BENT, engines, "small").floor == 1e-6
@@ -95,9 +102,11 @@ def test_a_small_run_takes_every_path(engines, small):
     ran, costs = [row for row in result.rows if row.why_not is None], result.tables["evaluations"]
     assert all(row.seconds > 0.0 for row in ran) and all(row.ns_per_state > 0.0 for row in costs)
     methods = {(method.engine, method.name) for method in settings.methods(engines, "full", BENT)}
-    assert {(row.engine, row.method) for row in ran} == methods
+    assert {(row.engine, row.method) for row in ran} == {
+        of for of in methods if of[0] in ("mujoco", "tmt", "scipy")
+    }
     assert {row.quantity for row in costs} == {"forward_dynamics"}
-    lost = [row for row in ran if row.diverged]
+    lost = [row for row in ran if row.ended]
     assert {(row.error, row.worst_error, row.energy_error) for row in lost} == {(None, None, None)}
     coarse = [row for row in ran if row.steps == 64 and row.method in ("rk4", "RK4")]
     for scene, error in {"zero, free": 1.6, "bent, free": 0.27}.items():
@@ -117,3 +126,42 @@ def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engine
 def test_whether_servos_are_off_is_known(engines):
     setups = Setup.quick(GRIPPER.robot, GRIPPER.engines), Setup.quick(ARM, engines)
     assert [untimed_speed(setup).servos_off for setup in setups] == [True, False]
+
+
+FILE_READERS = [name for name, record in RECORDS.items() if record.reads_file]
+
+
+def test_engines_that_read_the_file_take_part_in_the_regular_scene_of_a_full_run(engines, monkeypatch):
+    monkeypatch.setattr(Outside, "unavailable", lambda engine: None)
+    there = [name for name in FILE_READERS if engines[name].methods]
+
+    def readers(size, case):
+        methods = settings.methods(engines, size, case)
+        return list(dict.fromkeys(method.engine for method in methods if method.engine in FILE_READERS))
+
+    assert readers("full", BENT) == there and {"drake", "mjx", "warp", "newton"} <= {*there}
+    assert readers("full", ARM.cases[0]) == readers("small", BENT) == readers("quick", BENT) == []
+
+
+@pytest.mark.parametrize("engine, method, size, expected", [
+    ("mujoco", "RK4", "full", (2**16, 2**16)), ("mujoco", "Euler", "full", (2**15, 2**15)),
+    ("tmt", "rk4", "full", (2**17, 2**18)), ("tmt", "rk4", "small", (7, 2**18)), ("scipy", "RK45", "quick", (2, None)),
+])  # fmt: skip
+def test_a_budget_is_that_of_the_finest_run(engines, engine, method, size, expected):
+    method = engines[engine].methods[method]
+    found, (least, most) = settings.budget(method, ARM, size), expected
+    settings_found = settings.settings_of(method, BENT, size)
+    assert found.why_not == "" and len(settings_found) <= found.settings
+    if size == "full":
+        assert least <= settings_found[-1].steps <= most and settings_found[0].steps == 64
+        assert all(fine.steps == 2 * coarse.steps for coarse, fine in pairwise(settings_found))
+    else:
+        assert len(settings_found) == least
+
+
+def test_no_unit_of_a_cart_is_rad():
+    setup = setup_of_file(SLIDE)
+    result = untimed_speed(setup)
+    assert {row.unit for row in result.rows} == {result.unit} == {"m"}
+    assert not any("rad" in name for row in result.rows for name in row.record())
+    assert "rad" not in say(result.notes[-1])
