@@ -16,7 +16,7 @@ from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
 from ...robots.coordinates import rates_at
 from ...robots.file import steps_afforded
-from ..followed import Deviation, Path, check_closest, differences, one_step, path_of
+from .paths import Deviation, Path, check_closest, differences, one_step, path_of
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 # decay rate times dt up to which RK4 is stable: beyond, each stage multiplies the rounding of the one before

@@ -8,8 +8,8 @@ import pytest
 from trajectory_curves import FREE, HELD, run_of
 
 import tmt
-from compare.experiments.followed import Deviation, Path
 from compare.experiments.trajectory import errors, headline, runs
+from compare.experiments.trajectory.paths import Deviation, Path
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.run import widest_judged
 from compare.robots.arm import ARM

@@ -13,9 +13,9 @@ import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
-from compare.experiments.followed import path_of
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import figures_runs, runs
+from compare.experiments.trajectory.paths import path_of
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.rounding import step_rounding
 from compare.judge.run import diverged_at, widest_judged

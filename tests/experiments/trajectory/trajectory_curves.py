@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from compare.experiments.followed import Path
+from compare.experiments.trajectory.paths import Path
 from compare.experiments.trajectory.runs import Run
 from compare.robots.arm import ARM
 

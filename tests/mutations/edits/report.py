@@ -12,7 +12,6 @@ EDITS = (
     ("verdict", "outcome", "failures([section])", "failures([])", "a section whose checks fail passes"),
     ("questions", "largest", "max(rows, *_1)", "min(rows, *_1)", "the smallest difference is the answer"),
     ("questions", "largest", "row['largest_difference'] is None", "False", "a diverged run is an answer"),
-    ("conclusions", "reaching", "_1 <= target", "True", "a setting beyond the target is cheapest"),
     ("verdict", "passed", "any(section.judged for section in sections)", "True", "a report without a check passes"),
     ("run.command", "carry_out", "0 if report.passed else 1", "0", "the exit status is 0 whatever fails"),
     ("run.examine", "add_problems", "asked is None or _1", "True", "a problem is told where nobody asks"),
