@@ -10,6 +10,7 @@ from matplotlib.figure import Figure as Drawing
 from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
+from compare.core.check import About
 from compare.report import images, provenance
 from compare.report.document import Document
 from compare.report.files import write
@@ -74,6 +75,34 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
     assert rest.count("<tr><td>kinematics</td><td>zero</td><td>Mbar</td>") == 5
     assert '<div class="pictures"><figure class="bad"><a href="#kinematics">' in top
     assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
+
+
+BROKEN = "runs to its end", None, 0.0, "equal", False, About.PROGRAM
+
+
+def test_what_broke_off_or_was_not_judged_is_on_the_first_screen_and_in_its_section_and_no_other_is(folder):
+    open_section = section("gravity", GOOD)
+    open_section.result.not_judged("held", "torque", "nothing moves")
+    sections = [section("mass", GOOD), open_section, section("speed", GOOD, BROKEN), section("trajectory", BAD)]
+    for one, what in zip(sections, (None, "torque", "runs to its end", "Mbar")):
+        top, rest = page_of(folder, [one])
+        text = Document(report_of(folder, [one])).text()
+        assert re.findall(rf"<td>{one.name}</td><td>\w*</td><td>([^<]*)</td>", top) == [what] * (what is not None)
+        assert [f"{label}:**" in rest for label in ("Failing checks", "Not judged")] == [False, False]  # no markup is left
+        labels = [f"<strong>{label}:</strong>" in rest for label in ("Failing checks", "Not judged")]
+        assert labels == [what not in (None, "torque"), what == "torque"]
+        assert labels == [f"**{label}:**" in text for label in ("Failing checks", "Not judged")]
+        assert ("nothing moves" in rest) == ("nothing moves" in text) == (what == "torque")
+    page = "".join(page_of(folder, sections))
+    links = re.findall(r'<a href="#(\w+)">(<span class="mark bad"[^<]*✗</span>)?(?:\w+)</a>', page.partition("<main")[0])
+    assert {name for name, mark in links if mark} == {"speed", "trajectory"}
+    assert {name for name, mark in links if not mark} == {"main", "questions", "mass", "gravity", "provenance"}
+
+
+@pytest.mark.parametrize("failing, said", [(0, "9 of 9"), (1, "8 of 9")])
+def test_the_number_of_an_experiment_counts_what_passes(failing, said, folder):
+    top, _ = page_of(folder, [section("mass", *[GOOD] * (9 - failing), *[BAD] * failing)])
+    assert f"<small>{said} checks passed; largest share of a tolerance: 50 %</small>" in top
 
 
 def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):

@@ -44,6 +44,12 @@ EDITS = (
     ("run.command", "compute", "has_report(_1)", "False", "an earlier report gives way to one that is not complete"),
     ("run.examine", "Run.finished", "name in self.clock.ended", "True", "what is under way is reported as finished"),
     # the first screen, and what is shown of a long table
+    ("report.document", "Document.first_screen", "failures(report.sections)", "failures(report.sections)[:1]",
+     "the first screen has nothing that broke off or was not judged"),
+    ("report.document", "Document.section", "not check.judged", "False", "a section does not say what was not judged"),
+    ("verdict", "headline", "check.passed", "True", "the number of an experiment counts what fails"),
+    ("report.document", "Document.links", "standing(section)[0] is False", "False", "no link says that something fails"),
+    ("report.document", "Document.links", "standing(section)[0] is False", "not standing(section)[0]", "what is open fails"),
     ("verdict", "standing", "any(failing)", "False", "the line of an experiment whose checks fail is good"),
     ("report.document", "Document.pictures", "any(other in wrong for _1 in _2)", "False", "no failing picture is marked"),
     ("quantities", "headline", "max(known, *_1)", "min(known, *_1)", "its line has the best difference"),
