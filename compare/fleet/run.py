@@ -10,14 +10,14 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from ..core.text import block
+from ..report.folder import clear_away
 from .cache import program, save, saved
 from .executors import Executor, Outcome
 from .models import Model, place_of_report
 from .table import BROKE, REFUSED, FileRow, row_of_data
 from .task import FleetOptions, compare_file
 
-AHEAD = 2  # files that are submitted for each worker
-POLLING = 0.3  # s between two lines of progress
+POLLING = 0.3  # s between two questions whether somebody is left to answer
 
 
 Answer = Future[Outcome[FileRow]]
@@ -36,27 +36,24 @@ class Run:
     under_way: dict[Answer, tuple[Model, str]] = field(default_factory=dict)  # and the keys of their reports
     done: SimpleQueue[Answer] = field(default_factory=SimpleQueue)
 
-    def carry_out(self, progress: Callable[[list[FileRow]], object]) -> None:
-        """Run to the end, copies last. progress is called with the new rows, and every POLLING s."""
-        waiting, most = list(self.models[::-1]), AHEAD * self.executor.workers
-        while waiting or self.under_way:
-            before = len(self.rows)
-            while waiting and len(self.under_way) < most and len(self.rows) == before:
-                self.start(waiting.pop())
-            if self.under_way and len(self.rows) == before:
-                try:
-                    answer = self.done.get(timeout=POLLING)
-                except Empty:
-                    self.executor.check()
-                else:
-                    self.receive(answer)
-            progress(self.rows[before:])
-        before, rows = len(self.rows), {row.file: row for row in self.rows}
+    def carry_out(self, say: Callable[[list[FileRow]], object]) -> None:
+        """Run to the end, copies last. say: called with new rows."""
+        for model in self.models:
+            self.start(model)
+        say(self.rows)
+        while self.under_way:
+            try:
+                self.receive(self.done.get(timeout=POLLING))
+            except Empty:
+                self.executor.check()
+            else:
+                say(self.rows[-1:])
+        rows = {row.file: row for row in self.rows}
         for model, first in self.copies:
             row = replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
             row.reason = block("fleet", "copy", file=first.shown, reason=row.reason)
             self.rows.append(row)
-        progress(self.rows[before:])
+            say([row])
 
     def start(self, model: Model) -> None:
         """Submit a file, unless it is not readable, a copy, or its report is up to date."""
@@ -86,10 +83,12 @@ class Run:
     def receive(self, answer: Answer) -> None:
         """A file is done: save its row beside its report."""
         (model, key), (row, why) = self.under_way.pop(answer), self.executor.outcome(answer)
+        place = self.out / place_of_report(model.shown)
         if row is None:
             row = FileRow(file=model.shown, verdict=BROKE, reason=why)
+            clear_away(place)
         else:
-            save(self.out / place_of_report(model.shown), key, asdict(row))
+            save(place, key, asdict(row))
         self.rows.append(row)
 
     def progress(self) -> list[str]:

@@ -26,7 +26,6 @@ class Now:
     lock = threading.RLock()
     is_listening = False  # an interrupt raises no KeyboardInterrupt in the run
     asked = 0  # interrupts so far
-    is_ending = False  # a further one cuts off what the first has begun
     is_interrupted = False
     is_settled = False  # an interrupt is too late
     outcome = "nothing was written"
@@ -47,8 +46,8 @@ def listen() -> None:
 
 def hear(*_: object) -> None:
     Now.asked += 1
-    if Now.is_ending:
-        raise KeyboardInterrupt
+    if Now.is_interrupted:
+        raise KeyboardInterrupt  # a further one cuts off what the first has begun
 
 
 def shield(is_on: bool = True) -> None:
@@ -66,7 +65,10 @@ def answered(run: Callable[[], int]) -> int:
     def carry_out() -> None:
         resource_tracker.ensure_running()  # unblocks signals where it starts
         shield()
-        status.set_result(run())
+        try:
+            status.set_result(run())
+        except BaseException as error:
+            status.set_exception(error)
 
     threading.Thread(target=carry_out, daemon=True).start()
     told = ""
@@ -89,11 +91,10 @@ def end() -> int:
     name, seconds = waited_for()
     where = f" while waiting for {name}, {seconds:.0f} s" if name else ""
     tell("ending")
-    Stream.silent, Now.is_ending = True, True  # the thread of the run goes on
+    Stream.silent = True  # the thread of the run goes on
     with suppress(BaseException):
         at_end.close()
-    Now.is_ending = False
-    with suppress(OSError):
+    with suppress(BaseException):
         overwritten = "\r" * os.isatty(2)  # ^C
         os.write(2, f"{overwritten}interrupted{where}; {Now.outcome}\n".encode())
     return 2

@@ -42,6 +42,13 @@ def test_what_a_worker_does_is_for_the_task_that_asked():
         assert LONG <= workers.clock.seconds_of("second") < 4 * LONG
 
 
+def test_what_other_workers_do_counts_for_the_task_of_the_run():
+    with start_workers() as workers, closing(Workers(1, Beginning())) as engine:
+        with workers.clock.of("engines"):
+            engine.submit(busy, 2 * LONG).result(SOON)
+        assert workers.clock.seconds_of("engines") >= 2 * LONG
+
+
 def fill_memory():
     """Take 100 MB in small pieces, of which every tenth stays."""
     pieces = [bytearray(2000) for _ in range(50_000)]
