@@ -230,6 +230,24 @@ def test_an_option_that_asks_for_a_change_is_named_where_it_changes_something(op
     assert {row.quantity for row in rows.values() if row.why == name} == quantities
     for row in rows.values():
         assert row.why in ("", name) and (difference(row) > 0.1) == (row.quantity in quantities)
+    stated = {"mass": 1.0, "com": [0.1, 0.0, 0.0], "inertia": np.diag(np.array(body[0].split(), float))}
+    for quantity, number in stated.items():  # those of the text
+        assert rows["b", quantity].stated == pytest.approx(np.array(number), abs=1e-15)
+
+
+def test_what_is_stated_is_in_the_axes_of_the_body_whatever_else_the_file_asks_for():
+    """A tensor about turned axes and an aligned free body, to which settotalmass gives half of its mass."""
+    body = """<body name="b" pos="1 2 3"><freejoint align="true"/><inertial pos="0.1 0 0.2" mass="2" quat="0.8 0 0.6 0"
+      diaginertia="0.1 0.2 0.25"/></body>"""
+    rows = rows_of(mjcf(body, '<compiler settotalmass="1" alignfree="true"/>'))
+    cosine, sine = 0.8**2 - 0.6**2, 2.0 * 0.8 * 0.6
+    R = np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
+    assert rows["b", "inertia"].stated == pytest.approx(R @ np.diag([0.1, 0.2, 0.25]) @ R.T)
+    assert rows["b", "pos"].stated == pytest.approx([1.0, 2.0, 3.0])
+    assert rows["b", "com"].stated == pytest.approx([0.1, 0.0, 0.2]) and rows["b", "mass"].stated == 2.0
+    reasons = {quantity: rows["b", quantity].why for quantity in ("pos", "com", "mass", "inertia")}
+    both = "settotalmass, alignfree"
+    assert reasons == {"pos": "alignfree", "com": "alignfree", "mass": "settotalmass", "inertia": both}
 
 
 def test_a_tensor_may_be_off_by_rounding_of_the_sum_of_its_moments():

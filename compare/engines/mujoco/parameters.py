@@ -1,11 +1,12 @@
 """Parameters: the compiled model in the project's symbols, and what the file states compared with it.
 
-Stated numbers are converted: nested frames, angles, axes of length 1, tensors in the axes of the body. Where
-the file asks the compiler to change a number, the option is named. Remarks tell a user of it, and of what is
-fixed or switched off.
+What the file states is compiled again without the options by which it asks the compiler to change numbers;
+these are named where they do. Remarks tell a user of them, and of what is fixed or switched off.
 """
 
-from collections.abc import Mapping
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import mujoco
@@ -16,8 +17,8 @@ from ...core.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
-from .locked import FROM_GEOMS
-from .names import FROM_4, aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
+from .locked import FROM_GEOMS, compiled
+from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
 from .source import Source, is_urdf
 
@@ -28,8 +29,6 @@ ABSENT = {  # in the equations, and forces at random states need not show them
     "actuator damping": "actuator_damping", "actuator armature": "actuator_armature",
     "tendon armature": "tendon_armature",
 }  # fmt: skip
-# relative error of the principal axes of a `fullinertia`: up to 5e-7 was seen before 4.0, 1.4e-14 since
-TO_PRINCIPAL_AXES = 0.0 if FROM_4 else 1e-6
 
 
 def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
@@ -85,9 +84,6 @@ def last_hinge(m: mujoco.MjModel, body: int) -> int:
     return int(m.body_jntadr[mover] + m.body_jntnum[mover] - 1) if m.body_jntnum[mover] else -1
 
 
-Options = Mapping[str, bool]  # of the file, and whether they are in force
-
-
 class Stated(NamedTuple):
     """One number, or a vector or tensor, of a body, a joint or the world."""
 
@@ -99,123 +95,122 @@ class Stated(NamedTuple):
     tolerance: float = 0.0  # the largest difference that is rounding
 
 
+# options of the compiler that change numbers: when they are in force, and what switches them off
+OPTIONS: dict[str, tuple[Callable[[Any], bool], Any]] = {
+    "settotalmass": (lambda mass: mass > 0.0, -1.0),
+    "inertiafromgeom": (
+        lambda kind: int(kind) == FROM_GEOMS,
+        int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO),
+    ),
+    "alignfree": (bool, False),
+    "boundmass": (lambda mass: mass > 0.0, 0.0),
+    "boundinertia": (lambda moment: moment > 0.0, 0.0),
+    "balanceinertia": (bool, False),
+}
+OF_JOINTS = "springdamper"  # with it the compiler chooses damping and stiffness of a joint
+FROM_INERTIAL = ("mass", "com", "inertia")
+
+
+def switched_off(spec: mujoco.MjSpec, name: str) -> bool:
+    """Whether an option was in force somewhere in a spec, where it is off now."""
+    if name == OF_JOINTS:
+        chosen = [joint for joint in spec.joints if np.any(joint.springdamper)]
+        for joint in chosen:
+            joint.springdamper = np.zeros(2)
+        return bool(chosen)
+    is_on, value = OPTIONS[name]
+    found = name == "alignfree" and any(map(aligns, spec.joints))
+    for joint in spec.joints if found else ():
+        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
+    for compiler in (spec.compiler, *(body.compiler for body in spec.bodies)):
+        found |= name != "alignfree" and is_on(getattr(compiler, name))
+        setattr(compiler, name, value)
+    return bool(found)
+
+
+def compiled_numbers(spec: mujoco.MjSpec) -> dict[tuple[str, str], np.ndarray]:
+    """The numbers of a spec. ValueError where MuJoCo makes no model of it."""
+    with warnings.catch_warnings(action="ignore"):  # the first reading has them
+        return numbers_of(compiled(spec))
+
+
+def numbers_of(m: mujoco.MjModel) -> dict[tuple[str, str], np.ndarray]:
+    """Numbers of each body and joint by their names and quantities; tensors in the axes of the body."""
+    numbers: dict[tuple[str, str], Any] = {}
+    for body in range(1, m.nbody):
+        inertia = tensor(matrix(m.body_iquat[body]), m.body_inertia[body])
+        values = {
+            "pos": m.body_pos[body],
+            "mass": m.body_mass[body],
+            "com": m.body_ipos[body],
+            "inertia": inertia,
+        }
+        numbers |= {(element_name(m, "body", body), name): value for name, value in values.items()}
+    for joint in range(m.njnt):
+        kind, dof = kind_of(m, joint), m.jnt_dofadr[joint]
+        values = {"anchor": m.jnt_pos[joint]} if kind in ("hinge", "ball") else {}
+        values |= {"axis": m.jnt_axis[joint]} if kind in ("hinge", "slide") else {}
+        values |= {
+            "armature": m.dof_armature[dof],
+            "damping": m.dof_damping[dof],
+            "stiffness": m.jnt_stiffness[joint],
+        }
+        numbers |= {(joint_name(m, joint), name): value for name, value in values.items()}
+    return {key: np.array(value, float) for key, value in numbers.items()}
+
+
 def stated_numbers(source: Source) -> list[Stated]:
-    """Every mass, position, tensor, axis, armature, damping and stiffness that a file states."""
-    spec, model = source.spec, source.model
-    if spec is None:
+    """Every mass, position, tensor, axis, armature, damping and stiffness that a file states.
+
+    They are those of the file compiled without the options that change numbers. One that changes a number is
+    found by compiling without it alone. balanceinertia lets tensors pass that are none of a body: without it
+    they are compiled with their trace added to each moment.
+    """
+    if source.spec is None:
         return []
+    names = (*OPTIONS, OF_JOINTS)
+    spec = source.bare.copy()
+    in_force, traces = [name for name in names if switched_off(spec, name)], dict[tuple[str, str], float]()
+    for body, number in zip(spec.bodies, source.bodies) if "balanceinertia" in in_force else ():
+        moments = body.fullinertia[:3] if np.isfinite(body.fullinertia[0]) else body.inertia
+        if body.explicitinertial:
+            traces[element_name(source.model, "body", number), "inertia"] = trace = float(np.sum(moments))
+            moments += trace
+    stated = compiled_numbers(spec)
+    for key, trace in traces.items():
+        stated[key] -= trace * np.eye(3)
+    others: dict[str, dict[tuple[str, str], np.ndarray] | None] = dict.fromkeys(in_force)
+    for name in in_force:
+        with suppress(ValueError):  # of a tensor
+            spec = source.bare.copy()
+            switched_off(spec, name)
+            others[name] = compiled_numbers(spec)
+    left = left_to_compiler(source)
     rows = []
-    for body, number in zip(spec.bodies[1:], source.bodies[1:]):
-        rows += of_body(spec, model, body, number)
-    for joint, number in zip(spec.joints, source.joints):
-        rows += of_joint(model, joint, number)
+    for key, number in numbers_of(source.model).items():
+        if key in left:
+            rows.append(Stated(*key, None, number[()], "inertia from geoms"))
+            continue
+        size = float(np.trace(stated[key]) if key[1] == "inertia" else np.abs(stated[key]).max())
+        tolerance, why = FACTOR * EPS * size, list[str]()
+        if np.abs(stated[key] - number).max() > tolerance:
+            for name, numbers in others.items():
+                change = np.abs(numbers[key] - number).max() if numbers else np.inf * (key[1] == "inertia")
+                why += [name] * bool(change > tolerance)
+        rows.append(Stated(*key, stated[key][()], number[()], ", ".join(why), tolerance))
     return rows
 
 
-def row_of(number: Stated, options: Options, size: float | None = None, precision: float = 0.0) -> Stated:
-    """A row; the options in force count where they may have changed a number that is not the stated one.
-
-    size: the sum of what is added in the number, None: its largest entry; precision: relative, of the
-    compiler.
-    """
-    stated = np.asarray(number.stated, float)
-    tolerance = max(FACTOR * EPS, precision) * (float(np.abs(stated).max()) if size is None else size)
-    is_same = np.abs(stated - number.compiled).max() <= tolerance
-    why = ", ".join(name for name, is_on in options.items() if is_on and not is_same)
-    return number._replace(why=why, tolerance=tolerance)
-
-
-def of_body(spec: mujoco.MjSpec, model: mujoco.MjModel, body: mujoco.MjsBody, number: int) -> list[Stated]:
-    name, compiler = element_name(model, "body", number), body.compiler
-    total = {"settotalmass": spec.compiler.settotalmass > 0.0}
-    from_geoms = {"inertiafromgeom": bool(body.geoms) and compiler.inertiafromgeom == FROM_GEOMS}
-    aligned = {"alignfree": any(map(aligns, body.joints))}
-    bounds = {"boundinertia": compiler.boundinertia > 0.0, "balanceinertia": bool(compiler.balanceinertia)}
-    mass, com = float(model.body_mass[number]), model.body_ipos[number].copy()
-    inertia = tensor(matrix(model.body_iquat[number]), model.body_inertia[number])
-    pos, _, length = in_frames(body.pos, body.frame)
-    place = row_of(Stated(name, "pos", pos, model.body_pos[number].copy()), aligned, length)
-    if body.explicitinertial:
-        stated_com, stated_inertia, length = stated_inertial(spec, body, com, inertia)
-        of_mass = from_geoms | total | {"boundmass": body.mass < compiler.boundmass}
-        precision = TO_PRINCIPAL_AXES if np.isfinite(body.fullinertia[0]) else 0.0
-        of_tensor, moments = Stated(name, "inertia", stated_inertia, inertia), float(np.trace(stated_inertia))
-        return [
-            place,
-            row_of(Stated(name, "mass", float(body.mass), mass), of_mass),
-            row_of(Stated(name, "com", stated_com, com), from_geoms | aligned, length),
-            row_of(of_tensor, from_geoms | aligned | total | bounds, moments, precision),
-        ]
-    low, high = compiler.inertiagrouprange
-    masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
-    numbers = {"mass": mass, "com": com, "inertia": inertia}
-    rows = [Stated(name, quantity, None, value, "inertia from geoms") for quantity, value in numbers.items()]
-    if masses and np.isfinite(masses).all():
-        stated = float(np.sum(masses))
-        options = total | {"boundmass": stated < compiler.boundmass}
-        rows[0] = row_of(Stated(name, "mass", stated, mass), options)
-    return [place, *rows]
-
-
-def of_joint(model: mujoco.MjModel, joint: mujoco.MjsJoint, number: int) -> list[Stated]:
-    name, kind, dof = joint_name(model, number), kind_of(model, number), model.jnt_dofadr[number]
-    chosen, rows = {"springdamper": bool(np.any(joint.springdamper))}, []
-    pos, turn, length = in_frames(joint.pos, joint.frame)
-    if kind in ("hinge", "ball"):
-        rows.append(row_of(Stated(name, "anchor", pos, model.jnt_pos[number].copy()), {}, length))
-    if kind in ("hinge", "slide"):
-        axis = turn @ joint.axis / np.linalg.norm(joint.axis)
-        rows.append(row_of(Stated(name, "axis", axis, model.jnt_axis[number].copy()), {}))
-    numbers = {"armature": model.dof_armature[dof], "damping": model.dof_damping[dof]}
-    for quantity, compiled in (numbers | {"stiffness": model.jnt_stiffness[number]}).items():
-        stated = float(np.ravel(getattr(joint, quantity))[0])  # the linear coefficient
-        options = {} if quantity == "armature" else chosen
-        rows.append(row_of(Stated(name, quantity, stated, float(compiled)), options))
-    return rows
-
-
-def in_frames(pos: ArrayLike, frame: mujoco.MjsFrame | None) -> tuple[np.ndarray, np.ndarray, float]:
-    """A position, (3,), through a frame and those around it, their turn, and the sum of lengths."""
-    place, turn = np.array(pos, float), np.eye(3)
-    length = float(np.linalg.norm(place))
-    while frame is not None:
-        R = orientation(frame.quat, frame.alt, frame.compiler)
-        length += float(np.linalg.norm(frame.pos))
-        place, turn, frame = frame.pos + R @ place, R @ turn, frame.frame
-    return place, turn, length
-
-
-def orientation(quat: np.ndarray, other: mujoco.MjsOrientation, options: mujoco.MjsCompiler) -> np.ndarray:
-    """The rotation matrix of an orientation in any of the file's notations."""
-    if mujoco.mjtOrientation(other.type) == mujoco.mjtOrientation.mjORIENTATION_QUAT:
-        return matrix(quat / np.linalg.norm(quat))
-    resolve = mujoco.MjSpec.resolve_orientation
-    return matrix(resolve(degree=bool(options.degree), sequence=options.eulerseq, orientation=other))
-
-
-def stated_inertial(
-    spec: mujoco.MjSpec, body: mujoco.MjsBody, com: np.ndarray, inertia: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
-    """CoM, (3,) m, and tensor, (3, 3) kg m2, of an inertial in the axes of its body; the sum of lengths, m.
-
-    A spec does not say in which of the body's frames it is: in the one that comes closest to the compiled
-    model.
-    """
-    stated = np.diag(body.inertia)
-    if np.isfinite(body.fullinertia[0]):
-        xx, yy, zz, xy, xz, yz = body.fullinertia
-        stated = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    turn = orientation(body.iquat, body.ialt, body.compiler)  # beside a fullinertia only in a URDF
-    stated, scale = turn @ stated @ turn.T, np.abs(inertia).max() or 1.0
-    candidates = []
-    for frame in (None, *(frame for frame in spec.frames if frame.parent == body)):
-        pos, R, length = in_frames(body.ipos, frame)
-        candidates.append((pos, R @ stated @ R.T, length))
-
-    def distance(candidate: tuple[np.ndarray, np.ndarray, float]) -> float:
-        return float(np.abs(candidate[0] - com).max() + np.abs(candidate[1] - inertia).max() / scale)
-
-    return min(candidates, key=distance)
+def left_to_compiler(source: Source) -> set[tuple[str, str]]:
+    """The numbers of bodies without an inertial; not their mass, if all of their geoms state theirs."""
+    left = set()
+    for body, number in zip(source.spec.bodies[1:], source.bodies[1:]) if source.spec else ():
+        low, high = body.compiler.inertiagrouprange
+        masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
+        quantities = FROM_INERTIAL[bool(masses) and bool(np.isfinite(masses).all()) :]
+        if not body.explicitinertial:
+            left |= {(element_name(source.model, "body", number), quantity) for quantity in quantities}
+    return left
 
 
 def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
