@@ -14,7 +14,7 @@ import numpy as np
 
 from ...robots.actuators import Controller, Posture
 from .inventory import set_fields
-from .names import SETTLING, control_of, element_name, number_of_actuators, output_of, set_control
+from .names import SETTLING, bit, control_of, element_name, number_of_actuators, on, output_of, set_control
 from .source import Source
 
 UNLIMITED = (
@@ -23,6 +23,8 @@ UNLIMITED = (
 )  # fmt: skip
 BESIDE = "actuator_delay", "actuator_damping", "actuator_dampingpoly"  # what a law of controls does not have
 AFFINE, CONSTANT = 1e-9, 1e-12  # relative to the largest force, and to the largest moment
+SOLVED, MOST_ITERATIONS = 1e-15, 100  # of the solver
+ACTING, IDLE = 0, 1  # groups of actuators
 WITHIN = (-0.7, 0.4)  # of the movement and of the speeds, at the fourth state
 
 
@@ -112,7 +114,7 @@ def clipped(m: mujoco.MjModel, u: np.ndarray) -> np.ndarray:
     for i in range(len(u)):
         place, inputs = control_of(m, i)
         is_integrator = m.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_INTEGRATOR
-        is_limited = not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL
+        is_limited = on(m, "CLAMPCTRL")
         if inputs and is_limited and m.actuator_ctrllimited[place] and not is_integrator:
             u[i] = np.clip(u[i], *m.actuator_ctrlrange[place])
         if m.actuator_actlimited[i] and int(m.actuator_dyntype[i]) in SETTLING:
@@ -200,6 +202,25 @@ class Actuators:
             (J.T * law.stiffness[acts]) @ J,
             (J.T * law.damping[acts]) @ J,
         )
+
+
+def engage(m: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, np.ndarray]:
+    """Switch on the actuators of a model that take part, without any range: their ctrl (nu,) and act (na,).
+
+    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method
+    (with PGS it is Euler's scheme). Activations are constant, see set_control.
+    """
+    m.opt.disableflags &= ~bit("ACTUATION")
+    set_fields(m, UNLIMITED, 0)
+    m.opt.solver, m.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVED
+    m.opt.iterations = max(m.opt.iterations, MOST_ITERATIONS)
+    ctrl, act = np.zeros(m.nu), np.zeros(m.na)
+    for i, u in enumerate(controller.controls):
+        m.actuator_group[i] = IDLE if u is None else ACTING
+        if u is not None:
+            set_control(m, i, u, ctrl, act)
+    m.opt.disableactuator = 1 << IDLE
+    return ctrl, act
 
 
 def drive_of(source: Source, keys: Mapping[int, str]) -> Actuators:

@@ -8,7 +8,6 @@ mj_forward.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from ...robots.case import Case
 from .. import GRID, Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
+from .actuators import engage
 from .inventory import contact_pairs
 from .names import (
     EVALUATIONS,
@@ -36,33 +36,25 @@ Pair = tuple[np.ndarray, np.ndarray]
 Read = Callable[[mujoco.MjData], ArrayLike]  # a quantity of a state
 
 
-class Engaged(NamedTuple):
-    """Actuators that act under constant controls."""
-
-    ctrl: Array = 0.0
-    act: Array = 0.0  # activations
-    torque: Array = 0.0  # the constant part of their generalized force, (nv,)
-
-
 class MujocoDynamics:
     """MuJoCo with one model; quantities at states q (..., nq), v, tau (..., nv), joints in the case's order.
 
     bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the
     position zero. bare: it is compared with a Tree that has the springs of the joints, and not the bodies
-    that never move. engaged: its actuators; of a given torque only the part beyond their constant part is
+    that never move. Of a torque that is given only the part beyond the constant part of its actuators is
     applied.
     """
 
-    def __init__(
-        self, model: mujoco.MjModel, case: Case, bodies: Sequence[int], bare: bool, engaged: Engaged
-    ) -> None:
+    def __init__(self, model: mujoco.MjModel, case: Case, bodies: Sequence[int], bare: bool) -> None:
         # where states are evaluated the file's integrator must not matter, as `discrete` does
         model.opt.integrator = INTEGRATORS["RK4"]
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         if bare:  # their height would count in the energy
             model.body_mass[np.setdiff1d(np.flatnonzero(~moving(model)), bodies)] = 0.0
         self.model, self.data = model, mujoco.MjData(model)
-        self.data.ctrl[:], self.data.act[:], self.constant = engaged
+        if case.controller:
+            self.data.ctrl[:], self.data.act[:] = engage(model, case.controller)
+        self.constant: Array = case.controller.torque if case.controller else 0.0
         self.coordinates, self.bodies, self.bare = case.coordinates, list(bodies), bare
         by_name = joint_places(model)
         places = [by_name[name] for name in case.joints]

@@ -5,18 +5,15 @@ from copy import copy
 from typing import Any
 
 import mujoco
-import numpy as np
 
 from tmt import Tree
 from tmt.methods import lone_speeds
 
-from ...robots.actuators import Controller
 from ...robots.case import Case
 from .. import Engine, Method
-from .actuators import UNLIMITED
-from .dynamics import Engaged, MujocoDynamics
-from .inventory import set_fields, switch_off
-from .names import FROM_4, INTEGRATORS, bit, set_control
+from .dynamics import MujocoDynamics
+from .inventory import switch_off
+from .names import FROM_4, INTEGRATORS, bit, rotors
 from .source import Source
 
 # MuJoCo's integrator: the method of tmt that is the same scheme, where no ball, no spring makes them differ
@@ -51,8 +48,6 @@ def methods_for(tree: Tree | None = None) -> dict[str, Method]:
 
 METHODS = methods_for()
 MODELS = 16  # most models of cases that an engine keeps
-SOLVED, MOST_ITERATIONS = 1e-15, 100
-ACTING, IDLE = 0, 1  # groups of actuators
 
 
 class Mujoco(Engine):
@@ -101,26 +96,26 @@ class Mujoco(Engine):
             switch_off(model)
         if not case.scene.gravity:
             model.opt.gravity[:] = 0.0
-        actuators = engaged(model, case.controller) if case.controller else Engaged()
-        dynamics = MujocoDynamics(model, case, self.bodies, self.bare, actuators)
+        dynamics = MujocoDynamics(model, case, self.bodies, self.bare)
         dynamics.model.dof_damping[dynamics.dofs] += case.added_damping
         return dynamics
 
 
-def engaged(model: mujoco.MjModel, controller: Controller) -> Engaged:
-    """Switch on the actuators of a model that take part, without any range.
+def bare_model(source: Source, rotors_in_joints: bool) -> mujoco.MjModel:
+    """A compiled model of a file for other engines, without forces, contacts and actuators that a Tree does not have.
 
-    `discrete` solves by iteration where a tendon couples branches: here to rounding and by Newton's method
-    (with PGS it is Euler's scheme). Activations are constant, see set_control.
+    rotors_in_joints: the armature of actuators is that of their joints.
     """
-    model.opt.disableflags &= ~bit("ACTUATION")
-    set_fields(model, UNLIMITED, 0)
-    model.opt.solver, model.opt.tolerance = mujoco.mjtSolver.mjSOL_NEWTON, SOLVED
-    model.opt.iterations = max(model.opt.iterations, MOST_ITERATIONS)
-    ctrl, act = np.zeros(model.nu), np.zeros(model.na)
-    for i, u in enumerate(controller.controls):
-        model.actuator_group[i] = IDLE if u is None else ACTING
-        if u is not None:
-            set_control(model, i, u, ctrl, act)
-    model.opt.disableactuator = 1 << IDLE
-    return Engaged(ctrl, act, controller.torque)
+    m = source.without({}, bare=True)
+    switch_off(m)
+    # MuJoCo Warp refuses the first; with the second its implicitfast is explicit in the damping
+    m.opt.disableflags &= ~bit("AUTORESET", "ACTUATION")
+    m.opt.disableflags |= bit("WARMSTART")  # its solver starts from the unconstrained acceleration
+    m.opt.solver = mujoco.mjtSolver.mjSOL_NEWTON  # of constraints, which are off; both refuse PGS
+    m.opt.iterations = m.opt.noslip_iterations = 0
+    if rotors_in_joints and hasattr(m, "actuator_armature"):
+        m.dof_armature += rotors(m)
+        m.actuator_armature[:] = 0.0
+    m.actuator_gainprm[:] = m.actuator_biasprm[:] = 0.0  # those with armature are still there
+    m.geom_contype[:] = m.geom_conaffinity[:] = 0  # MJX refuses pairs even if there are no contacts
+    return m

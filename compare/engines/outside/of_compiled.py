@@ -36,7 +36,7 @@ class OfCompiled(ReadModel):
     rotors_in_joints: ClassVar[bool] = False  # the armature of actuators is that of their joints
 
     def __init__(self, file: File, precision: str):
-        from ..mujoco.handed_on import bare_model
+        from ..mujoco.engine import bare_model
         from ..mujoco.names import joint_places
         from ..mujoco.source import Source
 

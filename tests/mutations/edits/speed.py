@@ -4,7 +4,7 @@ EDITS = (
     ("timing", "fastest", "min(taken)", "7 * min(taken)", "times x 7"),
     ("timing", "in_turns", "now() - begin", "7 * (now() - begin)", "seconds x 7"),
     ("timing", "is_timed", "len(taken) * min(taken)", "sum(taken)", "a call that was disturbed ends the repetition"),
-    ("speed", "judged", "_1.feeds_back and not regular.controller", "False", "nobody is told that servos are off"),
+    ("speed", "judged", "bool(_1) and not regular.controller", "False", "nobody is told that servos are off"),
     ("speed.runs", "take_times", "factor * min(seconds)", "7 * factor * min(seconds)", "reported seconds x 7"),
     ("speed.runs", "take_times", "factor * min(seconds)", "factor * max(seconds)", "the slowest run is reported"),
     ("speed.runs", "scene_runs", "max(_1, exact.apart)", "_1", "a reference of few digits is taken as exact"),
