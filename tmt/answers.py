@@ -6,6 +6,7 @@ wrong with what is given; whatever is, the literal form says.
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,28 +23,22 @@ from tmt.model.values import real_numbers
 
 MOST = 64  # models that are held, besides those that are prepared
 DOUBLE = np.dtype(float)
-all_answers: dict[int, "Answers"] = {}
+prepared: dict[Tree, "Answers"] = {}
 
 
 def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
     """The quantity of states of any batch shape, given as the function in literal.py takes them."""
-    answers = all_answers.get(id(model))
-    if answers is None and isinstance(model, Tree):
-        answers = answers_of(model)
-    result = answers.by_machine_code(quantity, arguments) if answers else None
-    if result is not None:
-        return result
+    if isinstance(model, Tree):
+        answers = prepared.get(model) or recent(model)
+        result = answers.by_machine_code(quantity, arguments)
+        if result is not None:
+            return result
     return literal.literal(quantity)(*arguments, model)
 
 
-def answers_of(model: Tree) -> "Answers":
-    answers = all_answers.get(id(model))
-    if answers is None:
-        others = [key for key, answers in list(all_answers.items()) if not answers.prepared]
-        for key in others if len(others) >= MOST else ():
-            all_answers.pop(key, None)
-        answers = all_answers.setdefault(id(model), Answers(model))
-    return answers
+@lru_cache(maxsize=MOST)
+def recent(model: Tree) -> "Answers":
+    return Answers(model)
 
 
 def prepare(model: Tree = ARM, *quantities: str) -> None:
@@ -69,15 +64,16 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     """
     checked_model(model)
     chosen = quantities or [name for name in PLAIN if not QUANTITIES[name].is_long]
+    answers = prepared.setdefault(model, recent(model))
     for evaluator in [Evaluator(model, quantity) for quantity in chosen]:
         evaluator.loop(wide=False)  # it is compiled, or loaded
-        answers_of(model).evaluators[evaluator.quantity] = evaluator
-        answers_of(model).prepared[evaluator.quantity] = evaluator.of_one
+        answers.evaluators[evaluator.quantity] = evaluator
+        answers.prepared[evaluator.quantity] = evaluator.of_one
 
 
 class Answers:
     def __init__(self, tree: Tree):
-        self.tree = tree  # held, so that no other has its id
+        self.tree = tree
         self.evaluators: dict[str, Evaluator] = {}
         self.prepared: dict[str, Callable[..., Any]] = {}  # of one state
         self.shapes = [(tree.coordinates.nq,), (tree.coordinates.nv,), (tree.coordinates.nv,), (1,)]

@@ -6,7 +6,7 @@ from numpy import ndarray
 from tmt import Tree
 from tmt.literal import gather
 from tmt.methods import METHODS, Linearized, amplification
-from tmt.methods.stepping import Method, stepped
+from tmt.methods.stepping import Method
 
 from .entries import Entries
 from .scale import EPS, FACTOR, gain_scale, motion_scale
@@ -61,7 +61,7 @@ def step_rounding(stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: nd
         stages.append(bounds)
         return list(a.T)
 
-    stepped(stepping, tree, slope, list(q.T), list(qd.T), dt)
+    stepping.step(slope, list(q.T), list(qd.T), dt, tree.coordinates)
     size, rounding = np.max(stages, axis=0)
     rates = dt * rounding + 8 * EPS * (np.abs(qd) + dt * size)
     angles = 8 * EPS * (of_positions(tree, q) + dt * np.abs(qd)) + dt * rates

@@ -92,7 +92,7 @@ class Midpoint(Method):
 
     order = 2
 
-    def step(self, slope, q, qd, dt):
+    def step(self, slope, q, qd, dt, joints):
         half = advance(q, dt / 2, (1.0,), [qd]), advance(qd, dt / 2, (1.0,), [slope(q, qd)])
         return advance(q, dt, (1.0,), [half[1]]), advance(qd, dt, (1.0,), [slope(*half)])
 
@@ -115,8 +115,8 @@ def test_a_method_of_ones_own(rng, monkeypatch):
 class Longer(RungeKutta):
     """A step that is another than the tableau says."""
 
-    def step(self, slope, q, qd, dt, *joints):
-        return super().step(slope, q, qd, 2.0 * dt, *joints)
+    def step(self, slope, q, qd, dt, joints):
+        return super().step(slope, q, qd, 2.0 * dt, joints)
 
 
 class Weaker(RungeKutta):

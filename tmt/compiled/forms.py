@@ -12,7 +12,7 @@ from typing import TypeVar
 from tmt.derivation import articulated, composite, linearized
 from tmt.derivation.dual import seeded
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.method import Terms, reduced_force
+from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
 from tmt.derivation.vectors import Rows, Scalar, Values, minus, plus
 from tmt.methods import Linearized, method_named, one_step
@@ -43,9 +43,9 @@ class Traceable(Dynamics):
     by_bodies: by articulated bodies, where all that a method takes implicitly acts at single joints.
     """
 
-    def __init__(self, tree: AnyTree, terms: Terms, by_bodies: bool = False):
-        super().__init__(terms)
+    def __init__(self, tree: AnyTree, form: Form, by_bodies: bool = False):
         self.n, self.by_bodies = len(tree.axis), by_bodies
+        super().__init__(form._replace(rates=linearized.rates if self.n > DENSE else None))
 
     def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
         if not self.by_bodies or (held and not held.acts_at_single_joints):
@@ -56,11 +56,6 @@ class Traceable(Dynamics):
             armature = plus(armature, [row[i] for i, row in enumerate(held.matrix)])
         return articulated.acceleration(tree, q, qd, force, armature)
 
-    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
-        if self.n <= DENSE:
-            return super().bias_rates(tree, q, qd)
-        return linearized.rates(tree, q, qd, [0.0] * self.n)[1]
-
     def solve_any(self, matrix: Rows, right: Values) -> Values:
         if self.n <= DENSE:
             return super().solve_any(matrix, right)
@@ -70,8 +65,7 @@ class Traceable(Dynamics):
 
 def all_dynamics(tree: AnyTree) -> list[Traceable]:
     """The ways to the accelerations of a tree: by Mbar and h in each form, and by articulated bodies."""
-    by_terms = [Traceable(tree, form.terms) for form in FORMS]
-    return [*by_terms, Traceable(tree, articulated.mass_matrix_and_bias, by_bodies=True)]
+    return [*(Traceable(tree, form) for form in FORMS), Traceable(tree, FORMS[-1], by_bodies=True)]
 
 
 @lru_cache(maxsize=64)

@@ -2,11 +2,11 @@
 
 import ctypes
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 
-from tmt.methods import METHODS, method_named
+from tmt.methods import method_named
 from tmt.methods.stepping import MOST_EVALUATIONS, Method
 from tmt.model.tree import Tree, checked_model
 
@@ -15,13 +15,11 @@ from .evaluator import WIDE
 
 SPREAD = 20_000  # evaluations of the dynamics from which several cores share them
 PIECES = 4  # for each core, as one of them may be busy with something else
-MOST = 64  # trees and methods whose compiled runs are held
 Array = np.ndarray
 Ended = tuple[Array, int]  # why each run ended, and the evaluations
 Call = Callable[[], None]
 DIRECT = ctypes.c_void_p
 ARGUMENTS = [*[DIRECT] * 3, *[ctypes.c_double] * 2, *[DIRECT] * 3, *[ctypes.c_int64] * 3]
-runners: dict[tuple[int, str], "Runner"] = {}
 
 
 class Runner:
@@ -111,12 +109,10 @@ def address(array: Array) -> int:
 
 def runner_of(tree: Tree, name: str) -> Runner:
     """The Runner of a tree and the method of that name as it is now; ValueError if they are none."""
-    runner = runners.get((id(tree), name)) if type(name) is str else None
-    # whose tree is held, so that no other has its id
-    if runner is None or runner.stepping is not METHODS.get(name):
-        checked_model(tree)
-        stepping = method_named(name)
-        if len(runners) >= MOST:
-            runners.clear()
-        runners[id(tree), name] = runner = Runner(tree, stepping)
-    return runner
+    checked_model(tree)
+    return held(tree, method_named(name))
+
+
+@lru_cache(maxsize=64)
+def held(tree: Tree, stepping: Method) -> Runner:
+    return Runner(tree, stepping)

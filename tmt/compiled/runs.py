@@ -10,11 +10,10 @@ evaluations are left; then both at the end. stop: a whole number, which ends all
 from collections.abc import Callable
 from typing import Any
 
-from tmt.derivation.coordinates import FLAT
 from tmt.derivation.dual import seeded
 from tmt.derivation.vectors import Values, minus, plus
 from tmt.methods.implicit import CLOSE, ITERATIONS
-from tmt.methods.stepping import DIVERGED, MANY, NEWTON, SMALL, Joints
+from tmt.methods.stepping import DIVERGED, MANY, NEWTON, SMALL
 from tmt.model.tree import Tree
 
 from . import forms, linear
@@ -40,7 +39,6 @@ class Step:
     def __init__(self, tree: Tree, stepping: Any, width: int):
         self.tree, self.stepping, self.width = tree, stepping, width
         self.nq, self.n = tree.coordinates.nq, tree.coordinates.nv
-        self.joints: Joints = tree.coordinates if tree.coordinates.balls else FLAT
         self.functions: list[Code] = []
         # of an adaptive method: the step that its tolerance wants, and how many evaluations are left
         self.wanted: Variable
@@ -55,7 +53,6 @@ class Step:
 
     def add_step(self, name: str) -> int:
         nq, n, stepping = self.nq, self.n, self.stepping
-        joints = [] if self.joints is FLAT else [self.joints]
         slope = forms.slope(self.tree, stepping)
         self.add(slope, self.width, inline=len(slope.nodes) * stepping.stages <= INLINED)
 
@@ -63,7 +60,9 @@ class Step:
             def called_slope(q: Values, qd: Values) -> Values:
                 return q[0].tape.call("slope", [*q, *qd, *tau, *dt], n)
 
-            return forms.flat(list(getattr(stepping, name)(called_slope, q, qd, dt[0], *joints)))
+            return forms.flat(
+                list(getattr(stepping, name)(called_slope, q, qd, dt[0], self.tree.coordinates))
+            )
 
         traced = trace(name, (nq, n, n, 1), function)
         self.add(traced, self.width, inline=True)
@@ -134,12 +133,12 @@ class Step:
         directional = forms.directional(self.tree, stepping)
         self.add(directional, width, inline=len(directional.nodes) * stepping.stages <= INLINED)
         for made_linear in (False, True):
-            self.add(residual(self.tree, stepping, self.joints, made_linear), width, inline=not made_linear)
+            self.add(residual(self.tree, stepping, made_linear), width, inline=not made_linear)
         if "solve" not in {code.name for code in self.functions}:
             self.functions.append(linear.solve())
 
         def finish(q: Values, qd: Values, dt: Values, a: Values) -> Values:
-            return forms.flat(list(stepping.finish(q, qd, dt[0], a, self.joints)))
+            return forms.flat(list(stepping.finish(q, qd, dt[0], a, self.tree.coordinates)))
 
         self.add(trace("finish", (nq, n, 1, unknown), finish), 1, inline=True)
 
@@ -211,7 +210,7 @@ def squares(state: Value, result: Value, first: int, scales: list[int | None], t
     return total
 
 
-def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
+def residual(tree: Tree, stepping: Any, linear: bool) -> Traced:
     """What accelerations a of the stages leave of their equations, and its derivative by da."""
     nq, n = tree.coordinates.nq, tree.coordinates.nv
 
@@ -219,7 +218,7 @@ def residual(tree: Tree, stepping: Any, joints: Joints, linear: bool) -> Traced:
         unknown, call = seeded(a, da), q[0].tape.call
         values: Values = []
         slopes: Values = []
-        for state in stepping.stage_states(q, qd, dt[0], unknown, joints):
+        for state in stepping.stage_states(q, qd, dt[0], unknown, tree.coordinates):
             x, dx = map(list, zip(*(unknown[0].parts(number) for part in state for number in part)))
             start = [*q, *qd]
             qdd = call("directional", [*(start if linear else x), *tau, *dt, *dx], 2 * n)

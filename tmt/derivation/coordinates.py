@@ -11,6 +11,7 @@ IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x o
 / 2)) / s^2, s = |u|.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -21,40 +22,7 @@ HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 
 TERMS = 17  # of the series of the arc sine, after the first: the next is below 1e-37
 TINY = 1e-300  # under a root: its own square root is far below any rounding, and no direction is undefined
 
-
-class Flat:
-    balls: tuple["Joint", ...] = ()
-
-    def move(self, q: Scalars, u: Scalars) -> Values:
-        return plus(q, u)
-
-    def rates(self, u: Scalars, qd: Scalars) -> Values:
-        return list(qd)
-
-    tangent = component_rates = rates
-
-
-class Ball:
-    """Coordinates of one ball: a quaternion of length 1 that moves by angular velocities in its own frame."""
-
-    def move(self, q: Scalars, u: Scalars) -> Values:
-        return normalized(product(q, exponential(u)))
-
-    def tangent(self, q: Scalars, dq: Scalars) -> Values:
-        return [2.0 * x for x in product(conjugate(q), dq)[1:]]
-
-    def component_rates(self, q: Scalars, qd: Scalars) -> Values:
-        return [0.5 * x for x in product(q, [0.0, *qd])]
-
-    def rates(self, movement: Scalars, speeds: Scalars) -> Values:
-        u, omega = Vector(*movement), Vector(*speeds)
-        half = sqrt(u.dot(u) + TINY) * 0.5
-        share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
-        once = u.cross(omega)
-        return list(omega + once * 0.5 + u.cross(once) * share)
-
-
-FLAT, BALL = Flat(), Ball()
+Rule = Callable[[Scalars, Scalars], Values]  # of one joint
 
 
 class Joint(NamedTuple):
@@ -65,10 +33,6 @@ class Joint(NamedTuple):
     @property
     def speeds(self) -> range:
         return range(self.qd.start, self.qd.stop)
-
-    @property
-    def rule(self) -> Flat | Ball:
-        return BALL if self.kind == "ball" else FLAT
 
 
 class Coordinates(NamedTuple):
@@ -85,9 +49,19 @@ class Coordinates(NamedTuple):
         """For each speed (nv,) the number in q of its joint's first position: the only one of a hinge."""
         return [joint.q.start for joint in self.joints for _ in joint.speeds]
 
+    def by_joint(
+        self, of_ball: Rule, of_other: Rule, first: Scalars, second: Scalars, *places: str
+    ) -> Values:
+        """The numbers that a rule gives for each joint; places: "q" or "qd", where its numbers stand in each array."""
+        result: Values = []
+        for joint in self.joints:
+            rule = of_ball if joint.kind == "ball" else of_other
+            result += rule(*(x[getattr(joint, place)] for x, place in zip((first, second), places)))
+        return result
+
     def move(self, q: Scalars, u: Scalars) -> Values:
         """The position after a movement u from q, quaternions of length 1."""
-        return [x for joint in self.joints for x in joint.rule.move(q[joint.q], u[joint.qd])]
+        return self.by_joint(lambda p, u: normalized(product(p, exponential(u))), plus, q, u, "q", "qd")
 
     def difference(self, q1: Scalars, q0: Scalars) -> Values:
         """The movement from q0 to q1, (nv,): of a ball the shortest."""
@@ -101,15 +75,35 @@ class Coordinates(NamedTuple):
 
     def tangent(self, q: Scalars, dq: Scalars) -> Values:
         """The movement that changes q by small dq, linear in dq."""
-        return [x for joint in self.joints for x in joint.rule.tangent(q[joint.q], dq[joint.q])]
+
+        def of_ball(p: Scalars, dp: Scalars) -> Values:
+            return [2.0 * x for x in product(conjugate(p), dp)[1:]]
+
+        return self.by_joint(of_ball, second, q, dq, "q", "q")
 
     def component_rates(self, q: Scalars, qd: Scalars) -> Values:
         """dq/dt at speeds qd, (nq,): of a ball p o (0, omega) / 2."""
-        return [x for joint in self.joints for x in joint.rule.component_rates(q[joint.q], qd[joint.qd])]
+
+        def of_ball(p: Scalars, omega: Scalars) -> Values:
+            return [0.5 * x for x in product(p, [0.0, *omega])]
+
+        return self.by_joint(of_ball, second, q, qd, "q", "qd")
 
     def rates(self, u: Scalars, qd: Scalars) -> Values:
         """du/dt at speeds qd, of a motion that has moved by u."""
-        return [x for joint in self.joints for x in joint.rule.rates(u[joint.qd], qd[joint.qd])]
+
+        def of_ball(movement: Scalars, speeds: Scalars) -> Values:
+            u, omega = Vector(*movement), Vector(*speeds)
+            half = sqrt(u.dot(u) + TINY) * 0.5
+            share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
+            once = u.cross(omega)
+            return list(omega + once * 0.5 + u.cross(once) * share)
+
+        return self.by_joint(of_ball, second, u, qd, "qd", "qd")
+
+
+def second(_: Scalars, values: Scalars) -> Values:
+    return list(values)
 
 
 @lru_cache(maxsize=256)

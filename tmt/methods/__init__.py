@@ -6,7 +6,7 @@ The same lines integrate floats, dual numbers (their exact Jacobian), mpmath num
 
 from dataclasses import dataclass
 
-from tmt.derivation.coordinates import FLAT
+from tmt.derivation.coordinates import Coordinates
 from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.methods import dop853
 from tmt.methods.derivatives import Linearized as Linearized
@@ -17,7 +17,7 @@ from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import lone_speeds as lone_speeds
-from tmt.methods.stepping import Joints, Method, Numbers, Slope, State, Tableau, advance, increments
+from tmt.methods.stepping import Method, Numbers, Slope, State, Tableau, advance, increments
 from tmt.model.values import shown
 
 Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
@@ -38,10 +38,10 @@ class RungeKutta(Tableau):
         if len(row) != i:
             raise ValueError(f"row {i} of A has {len(row)} entries; an explicit method has {i}")
 
-    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         return self.combined(self.stage_slopes(slope, q, qd, dt, joints), q, qd, dt, joints)
 
-    def stage_slopes(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints) -> Slopes:
+    def stage_slopes(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> Slopes:
         """The rates (of the movement from q, see coordinates.py) and the accelerations of all stages."""
         rates: list[Values] = []
         changes: list[Values] = []
@@ -51,7 +51,7 @@ class RungeKutta(Tableau):
             changes.append(slope(joints.move(q, u), qd_i))
         return rates, changes
 
-    def combined(self, slopes: Slopes, q: Values, qd: Values, dt: Scalar, joints: Joints) -> State:
+    def combined(self, slopes: Slopes, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         rates, changes = slopes
         return joints.move(q, increments(dt, self.b, rates, len(qd))), advance(qd, dt, self.b, changes)
 
@@ -76,7 +76,7 @@ class AdaptiveRungeKutta(RungeKutta):
         if len(self.errors) != 2 or any(len(row) != len(self.b) for row in self.errors):
             raise ValueError("errors must be two rows of one weight for each stage")
 
-    def attempt(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> Rows:
+    def attempt(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> Rows:
         """A step, and the two estimates of its error, each for the movement and qd."""
         slopes = self.stage_slopes(slope, q, qd, dt, joints)
         estimates = [increments(dt, weights, part, len(qd)) for weights in self.errors for part in slopes]

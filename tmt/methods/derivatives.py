@@ -26,7 +26,7 @@ from tmt.derivation.vectors import (
     solve_any,
     total,
 )
-from tmt.methods.stepping import LITERAL, Dynamics, Held, Implicit, Method, stepped
+from tmt.methods.stepping import LITERAL, Dynamics, Held, Implicit, Method
 from tmt.methods.stepping import State as Reached
 
 Array = np.ndarray
@@ -47,8 +47,7 @@ class Linearized(Dynamics):
     """Accelerations of dual numbers over any scalar, by the derivatives of the linear system."""
 
     def __init__(self, form: Form = COMPOSITE):
-        super().__init__(form.terms)
-        self.form = form
+        super().__init__(form)
         self.last: Change  # of the state that was met last
         # dual numbers of traced scalars meet the same states once for each direction; i: of a scalar on the tape
         self.changes: dict[tuple[int, ...], Change] = {}
@@ -69,11 +68,6 @@ class Linearized(Dynamics):
         if held:
             right = minus(right, [dual.parts(x)[1] for x in held.pull])
         return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
-
-    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
-        if self.form.rates is None:
-            return super().bias_rates(tree, q, qd)
-        return self.form.rates(tree, q, qd, [0.0] * len(qd))[1]
 
     def change(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held) -> Change:
         a = super().acceleration(tree, q, qd, tau, implicit)
@@ -107,7 +101,11 @@ def one_step(
     dynamics: Dynamics = LITERAL,
 ) -> Reached:  # fmt: skip
     """The state (q, qd) of a tree one dt later by a method, over any scalar."""
-    return stepped(stepping, tree, lambda q, qd: stepping.slope(tree, q, qd, tau, dt, dynamics), q, qd, dt)
+
+    def slope(q: Values, qd: Values) -> Values:
+        return stepping.slope(tree, q, qd, tau, dt, dynamics)
+
+    return stepping.step(slope, q, qd, dt, tree.coordinates)
 
 
 def amplification(
@@ -153,7 +151,7 @@ def jacobian_of_part(
     state = [*seeded(start[: len(moved)], moved), *start[len(moved) :]]
     # the Jacobian of stages that are solved for is by dual numbers of dual numbers
     through_solution = nv <= FEW_SPEEDS or stepping.solves_stages
-    dynamics = Dynamics(COMPOSITE.terms) if through_solution else Linearized()
+    dynamics = Dynamics(COMPOSITE) if through_solution else Linearized()
     torque = state[nq + nv :]
     new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq : nq + nv], torque, dt, dynamics)
     moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])

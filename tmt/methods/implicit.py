@@ -15,10 +15,10 @@ from itertools import chain
 
 import numpy as np
 
-from tmt.derivation.coordinates import FLAT, Flat, Joint, normalized, product
+from tmt.derivation.coordinates import Coordinates, Joint, normalized, product
 from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
 from tmt.derivation.vectors import Scalar, Values, minus, plus, solve_any, weighted
-from tmt.methods.stepping import Joints, Numbers, Slope, State, Tableau
+from tmt.methods.stepping import Numbers, Slope, State, Tableau
 
 ITERATIONS = 50  # Newton's method doubles the correct digits each time: a stage that needs more is not found
 CLOSE = 1e-10  # change of the accelerations, of 1 rad/s2 + their size: the next would be its square
@@ -38,7 +38,7 @@ class ImplicitRungeKutta(Tableau):
     def stages(self) -> int:
         return len(self.b)
 
-    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         """The state (q, qd) one dt later; ArithmeticError where Newton's method does not find the stages."""
 
         def linear(q_i: Values, qd_i: Values) -> Values:
@@ -61,7 +61,9 @@ class ImplicitRungeKutta(Tableau):
             last = not is_linear and largest(change) <= CLOSE * (1.0 + largest(a))
         raise ArithmeticError(f"Newton's method does not find the stages at dt = {dt} s")
 
-    def stage_states(self, q: Values, qd: Values, dt: Scalar, a: Values, joints: Joints) -> Iterator[State]:
+    def stage_states(
+        self, q: Values, qd: Values, dt: Scalar, a: Values, joints: Coordinates
+    ) -> Iterator[State]:
         """The states (q_i, qd_i) of the stages with accelerations a, all of them in one list."""
         n, s = len(qd), range(self.stages)
         speeds = [[qd[k] + dt * weighted(self.A[i], a[k::n]) for k in range(n)] for i in s]
@@ -84,7 +86,7 @@ class ImplicitRungeKutta(Tableau):
         components = solve_any(matrix, q[ball.q] * len(s))
         return [components[4 * i : 4 * i + 4] for i in s]
 
-    def finish(self, q: Values, qd: Values, dt: Scalar, a: Values, joints: Joints) -> State:
+    def finish(self, q: Values, qd: Values, dt: Scalar, a: Values, joints: Coordinates) -> State:
         n, s = len(qd), range(self.stages)
         twice = [sum(self.b[k] * self.A[k][j] for k in s) for j in s]
         moved, balls = [dt * (qd[k] + dt * weighted(twice, a[k::n])) for k in range(n)], []
@@ -97,10 +99,8 @@ class ImplicitRungeKutta(Tableau):
         return placed(joints, q, moved, balls), [qd[k] + dt * weighted(self.b, a[k::n]) for k in range(n)]
 
 
-def placed(joints: Joints, q: Values, moved: Values, balls: list[Values]) -> Values:
+def placed(joints: Coordinates, q: Values, moved: Values, balls: list[Values]) -> Values:
     """The position after a movement from q, (nv,), of all but the balls, and these quaternions."""
-    if isinstance(joints, Flat) or not balls:
-        return plus(q, moved)
     turned, result = iter(balls), []
     for joint in joints.joints:
         result += next(turned) if joint.kind == "ball" else [q[joint.q.start] + moved[joint.qd.start]]

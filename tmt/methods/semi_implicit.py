@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TypeVar
 
-from tmt.derivation.coordinates import FLAT
+from tmt.derivation.coordinates import Coordinates
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.method import with_diagonal
 from tmt.derivation.vectors import Scalar, Values, weighted
 
-from .stepping import LITERAL, Dynamics, Implicit, Joints, Method, Slope, State, advance, increments
+from .stepping import LITERAL, Dynamics, Implicit, Method, Slope, State, advance, increments
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]
@@ -63,7 +63,7 @@ class SemiImplicitEuler(Method):
     ) -> Values:
         return dynamics.acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
 
-    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
 

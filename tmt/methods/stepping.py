@@ -12,17 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tmt.derivation import method
-from tmt.derivation.coordinates import FLAT, Coordinates, Flat
+from tmt.derivation import method, quantities
+from tmt.derivation.coordinates import Coordinates, coordinates_of
 from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.method import Terms
+from tmt.derivation.quantities import Form
 from tmt.derivation.vectors import Rows, Scalar, Values, added, minus, plus, solve, solve_any, weighted
 from tmt.model.values import listed, real_numbers, shown
 
 Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
 Numbers = tuple[float, ...]
-Joints = Coordinates | Flat
 DIVERGED, NEWTON, SMALL, MANY = 1, 2, 3, 4  # why a run ends; 0: it does not
 MOST_EVALUATIONS = 100_000_000  # of the dynamics, in a run of an adaptive method
 
@@ -45,14 +44,14 @@ Held = Implicit | None
 
 
 class Dynamics:
-    """Accelerations from Mbar and h, which `terms` gives."""
+    """Accelerations from Mbar and h, as a Form has their sums."""
 
-    def __init__(self, terms: Terms = method.mass_matrix_and_bias):
-        self.terms = terms
+    def __init__(self, form: Form = quantities.LITERAL):
+        self.form = form
 
     def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
-        M, h = self.terms(tree, q, qd)
+        M, h = self.form.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
         if held is None:
             return solve(M, force)
@@ -64,7 +63,9 @@ class Dynamics:
         return self.solve_any(matrix, minus(force, held.pull))
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
-        return method.bias_rates(tree, q, qd, self.terms)
+        if self.form.rates is None:
+            return method.bias_rates(tree, q, qd, self.form.terms)
+        return self.form.rates(tree, q, qd, [0.0] * len(qd))[1]
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:
         return solve_any(matrix, right)
@@ -76,10 +77,10 @@ LITERAL = Dynamics()
 class Method(ABC):
     """A method of integration. Another one is a hashable subclass with a `step`, such as a frozen dataclass.
 
-    `step(slope, q, qd, dt)` returns the state (q, qd) one dt later, each a list of n scalars of any type; it
-    asks `slope(q, qd)` for accelerations, a list of n. Which accelerations these are is said by the method's
-    own `slope`. For a tree with balls it is given their coordinates too (coordinates.py), `step(slope, q, qd,
-    dt, joints)`: q is longer than qd.
+    `step(slope, q, qd, dt, joints)` returns the state (q, qd) one dt later, each a list of scalars of any
+    type; it asks `slope(q, qd)` for accelerations, a list of nv. Which accelerations these are is said by the
+    method's own `slope`. Positions move by `joints.move(q, u)`, see coordinates.py: with balls q is longer
+    than qd.
     """
 
     order: int = 1  # the error of a run falls with dt to this power
@@ -95,7 +96,7 @@ class Method(ABC):
             positions.append(q)
             return [0.0]
 
-        self.step(slope, [0.0], [0.0], 1.0)
+        self.step(slope, [0.0], [0.0], 1.0, coordinates_of(("hinge",)))
         return len(positions)
 
     def slope(
@@ -104,13 +105,8 @@ class Method(ABC):
         return dynamics.acceleration(tree, q, qd, tau)
 
     @abstractmethod
-    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Joints = FLAT) -> State:
+    def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         """The state (q, qd) one dt later, from `slope(q, qd)`."""
-
-
-def stepped(stepping: Method, tree: AnyTree, slope: Slope, q: Values, qd: Values, dt: Scalar) -> State:
-    joints = tree.coordinates
-    return stepping.step(slope, q, qd, dt, joints) if joints.balls else stepping.step(slope, q, qd, dt)
 
 
 def increments(dt: Scalar, weights: Sequence[float], slopes: Sequence[Values], n: int) -> Values:

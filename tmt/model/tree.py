@@ -119,6 +119,11 @@ class Tree(Mechanism[float]):
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 
+    def __hash__(self) -> int:
+        return hash(
+            (self.joint_names, self.mass)
+        )  # a key of caches in each call: all fields take as long as M
+
     def __repr__(self) -> str:
         n, m = len(self.joint_names), len(self.body_names)
         names = shorten(", ".join(self.joint_names), NAMES_SHOWN, placeholder=" ...")

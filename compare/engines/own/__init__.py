@@ -6,7 +6,6 @@ import numpy as np
 from numpy import ndarray
 
 import tmt
-from tmt.methods.stepping import stepped
 
 from ...robots.case import Case
 from .. import Course, Engine, EngineRecord, Method, Motion, OneByOne, Prepared
@@ -101,7 +100,7 @@ class OwnDynamics(OneByOne):
             with np.errstate(all="ignore"):  # a run may diverge
                 while len(states) <= course.steps and np.isfinite(states[-1]).all():
                     q, v = list(states[-1][:nq]), list(states[-1][nq:])
-                    q, v = stepped(scheme, self.tree, slope, q, v, course.dt)
+                    q, v = scheme.step(slope, q, v, course.dt, self.tree.coordinates)
                     states.append(np.array([*q, *v]))
             return np.array(states)
 

@@ -17,7 +17,7 @@ from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
 from tmt.compiled import store
 from tmt.compiled.machine import Library
-from tmt.compiled.runner import runners as compiled_runs
+from tmt.compiled.runner import held as compiled_runs
 from tmt.methods import METHODS, SemiImplicitEuler, semi_implicit
 
 STEPS = {"one step", "open loop"}
@@ -89,9 +89,9 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
         pytest.skip("this MuJoCo has no such integrator")
     monkeypatch.setitem(of, name, wrong)
     monkeypatch.setattr(store, "library", lambda source, *what: Library(source()))
-    compiled_runs.clear()
+    compiled_runs.cache_clear()
     found = failing(*gripper, integrator)
-    compiled_runs.clear()
+    compiled_runs.cache_clear()
     assert found == {(integrator, level) for level in STEPS}
 
 

@@ -31,7 +31,7 @@ EDITS = (
     ("semi_implicit", "SemiImplicitEuler.gains_held", "(_1, tree.speed_gain)", "(tree.speed_gain, _1)",
      "gains of positions act on speeds"),
     ("answers", "Answers.__init__", "not tree.never_singular", "False", "compiled code answers where Mbar is singular"),
-    ("answers", "answers_of", "not answers.prepared", "True", "a prepared model is forgotten"),
+    ("answers", "answered", "prepared.get(model) or _1", "_1", "a prepared model is forgotten"),
     ("compiled.sources", "own_sources", "stamps(IMPORTED) == IMPORTED", "True", "changed sources keep their name"),
     ("simulation", "simulate", "values.positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
     ("answers", "Answers.by_machine_code", "count <= SMALL", "True", "machine code never answers unasked"),
