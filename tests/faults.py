@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,9 +27,10 @@ from tmt.derivation.composite import mass_matrix_and_bias
 ARM6 = Path(__file__).parent / "models" / "arm6.xml"
 SECONDS = 20.0  # of one search: what else the machine does must not change the outcome
 SLIPS = {
-    "R for R'": "R for R' in the angular velocity of {}", "turned the wrong way": "R' I R for R I R' of {}",
-    "not turned": "inertia of {} not turned to the inertial frame",
-    "about the joint": "inertia of {} about its joint and mass counted again",
+    "turned the wrong way": "inertia of {}: turned back, R' I R for R I R'",
+    "not turned": "inertia of {}: not turned to the inertial frame",
+    "about the joint": "inertia of {}: about its joint, and m (c'c 1 - c c') counted again",
+    "relative": "angular velocity of {}: relative to the body before, not to the world",
 }  # fmt: skip
 
 
@@ -58,9 +60,9 @@ def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", 
             I = Rt @ Rt @ I @ R @ R
         elif slips == "about the joint":
             I = I + mass * (c @ c * np.eye(3) - np.outer(c, c))
-        elif slips == "R for R'":
-            own_w, own_alpha, own_B = (R @ R @ x for x in (own_w[..., None], own_alpha[..., None], own_B))
-            own_w, own_alpha = own_w[..., 0], own_alpha[..., 0]
+        elif slips == "relative":  # the axis of its own joint does not move in the body
+            own_B = own_B * (np.arange(len(tree.axis)) == tree.body_joint[b])
+            own_w, own_alpha = (own_B @ qd[..., None])[..., 0], 0.0 * own_alpha
         M = M + factor["translation"] * mass * np.swapaxes(T[:, b], 1, 2) @ T[:, b]
         M = M + factor["rotation"] * np.swapaxes(own_B, 1, 2) @ I @ own_B
         force = mass * (factor["convective"] * a[:, b] - factor["gravity"] * np.array(tree.gravity))
@@ -130,6 +132,11 @@ def faults_of(robot: str, tree: tmt.Tree, rng: np.random.Generator) -> list[Faul
             add("term", name.format(of), derived, factor, factors={(b, term): factor for b in which})
         for slip, name in SLIPS.items():
             add("slip", name.format(of), derived, slip=slip, bodies=which)
+    for a, b in combinations(bodies, 2):
+        masses = list(tree.mass)
+        masses[a], masses[b] = masses[b], masses[a]
+        both = f"{tree.body_names[a]} and {tree.body_names[b]}"
+        add("exchange", f"masses of {both}", by_composite, edited=replace(tree, mass=masses))
     order = rng.permutation(n).tolist()
     if order != sorted(order) and len(set(tree.kind)) == 1:
         add("convention", "order of the joints", in_own_joints, order=order)
@@ -178,7 +185,7 @@ def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
 def outcome(fault: Fault) -> tuple[str, list[str]]:
     found = diagnosis_of(fault, seed=3)
     places = [cause.place for cause in found.causes]
-    named = [cause for cause in found.causes if cause.place == fault.place]
+    named = [cause for cause in found.causes if fault.place in (cause.place, f"{cause.place}: {cause.explains}")]
     if named and (not fault.values or np.isclose(named[0].explains, fault.values[0], rtol=1e-6, atol=1e-9)):
         return "named", places
     if not found.causes:

@@ -178,7 +178,7 @@ def changing(q):
     ({"mass_matrix": changing}, "and at 99 more states"),
     (RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: acceleration(q, v, -t, wrong_bias)}, "torque in the acc"),
     (RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: [1.0, 1.1] * acceleration(q, v, t, wrong_bias)}, "another"),
-    ({"mass_matrix": lambda q: 1.1 * mass_matrix(q), "bias": bias, "gravity": lambda q: 1.2 * gravity(q)}, "z: -11.772"),
+    ({"mass_matrix": mass_matrix, "bias": bias, "gravity": lambda q: 1.2 * gravity(q)}, "z: -11.772"),
     ({"mass_matrix": lambda q: mass_matrix(q) + [[0.0, 0.1], [0.0, 0.0]]}, "symmetric: M[hip][knee]"),
 ])  # fmt: skip
 def test_the_probable_cause_of(brought, cause):

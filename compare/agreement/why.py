@@ -69,12 +69,11 @@ class Affine(NamedTuple):
         return -np.einsum("sij,sj->si", M, qdd) - passive
 
     def inputs(self, q: ndarray) -> ndarray | None:
-        """By which factor each torque acts, (nv,), if the mass matrix is right; None if it is not."""
-        right = literal.mass_matrix(q, self.tree)
-        acting = right @ self.slopes(q)
-        factors = np.einsum("sii->si", acting)
-        off = np.abs(acting - factors.mean(axis=0)[:, None] * np.eye(len(factors[0])))
-        return factors.mean(axis=0) if off.max() <= CONSTANT * (1.0 + np.abs(acting).max()) else None
+        """What each torque (column) does at each joint (row), (nv, nv), if the mass matrix is right; else None."""
+        acting = literal.mass_matrix(q, self.tree) @ self.slopes(q)
+        factors = acting.mean(axis=0)
+        off = np.abs(acting - factors).max()
+        return factors if off <= CONSTANT * (1.0 + np.abs(acting).max()) else None
 
     def values(self, q: ndarray, qd: ndarray, rounding: float) -> "tuple[Values, partial[ndarray]] | None":
         """The mass matrix and the bias, and the bias at other speeds; None where there is no such matrix."""
@@ -149,9 +148,9 @@ def of_equations(comparison: Comparison, values: Values) -> Why:
 
 
 def is_single(values: ndarray) -> bool:
-    """Whether all numbers have single precision, and not all are whole."""
+    """Whether all numbers have single precision, and some of them need all of it."""
     finite = values[np.isfinite(values)]
-    return bool((finite == finite.astype(np.float32)).all() and (finite % 1.0 != 0.0).any())
+    return bool((finite == finite.astype(np.float32)).all() and (finite != finite.astype(np.float16)).any())
 
 
 def beside(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> str:
@@ -178,8 +177,8 @@ def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -
         return solved if values.are_finite else of_forces(asked, right, tau, qdd)
     affine = Affine(tree, equations)
     inputs = affine.inputs(q)
-    if inputs is not None and (np.abs(inputs - 1.0) > CONSTANT).any():
-        return of_inputs(asked, inputs, LeftOver(tree, right, inputs * tau, qdd, rounding))
+    if inputs is not None and (np.abs(inputs - np.eye(len(inputs))) > CONSTANT).any():
+        return of_inputs(asked, inputs, LeftOver(tree, right, tau @ inputs.T, qdd, rounding))
     if values.are_finite:
         return solved
     own = affine.values(q, qd, rounding)
@@ -191,11 +190,15 @@ def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -
 
 
 def of_inputs(asked: Asked, factors: ndarray, left_over: LeftOver) -> Why:
-    """Torques that act with other factors, and what else acts; left_over: with these factors."""
-    named = zip(asked.coordinates.speeds, factors.tolist())
-    wrong = [(name, x) for name, x in named if abs(x - 1.0) > CONSTANT]
-    about: dict[str, Any] = {"rank": 2, "kind": "input", "stated": 1.0, "unit": "times"}
-    causes = tuple(Cause(place=f"tau of {name}", explains=x, **about) for name, x in wrong)
+    """Torques that act with other factors or elsewhere, and what else acts; left_over: with these factors."""
+    names = asked.coordinates.speeds
+    off = np.argwhere(np.abs(factors - np.eye(len(names))) > CONSTANT).tolist()
+    wrong = [(names[j], names[i] if i != j else "", float(factors[i, j])) for i, j in off]
+    about: dict[str, Any] = {"rank": 2, "kind": "input", "unit": "times"}
+    causes = tuple(
+        Cause(place=f"tau of {name}{f' at {at}' * bool(at)}", stated=float(not at), explains=x, **about)
+        for name, at, x in wrong
+    )
     text = say(Finding("agreement", "inputs", {"factors": wrong}))
     is_found = left_over.ratio <= 1.0 or bool(left_over.causes)
     return Why(f"{text} {left_over.sentence()}".rstrip(), is_found, causes + left_over.causes)

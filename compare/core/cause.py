@@ -21,6 +21,9 @@ class Cause:
     parts: tuple["Cause", ...] = ()  # that are said instead of this one: the two of rank 3
     joints: str = ""  # how joints are to be stated, joints=[...]; "": no convention, or they cannot be
     quantity: str = ""  # of a number of the file: its name in `parameters`
+    form: str = ""  # its place with {} for the body or joint
+    owners: int = 1  # the bodies or joints that it is of
+    cost: float = 0.0  # beside that of its kind and its numbers, see diagnosis/likelihood.py
     size: float = inf  # of such a number: its difference over its tolerance
 
     def record(self) -> dict[str, Any]:

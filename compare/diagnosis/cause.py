@@ -33,6 +33,7 @@ class Diagnosis(NamedTuple):
     parts: tuple[str, ...] = ()  # that differ: "M", "h", or its "velocity terms" and "gravity"
     known: tuple[str, ...] = ()  # parts that are compared
     is_symmetric: bool = True  # the given M
+    is_of_forces: bool = False  # of accelerations, of which the forces are given
     too_few: int = 0  # states, if they are too few for a search
     seconds: float | None = None  # of a search that was not finished
 
@@ -42,7 +43,7 @@ class Diagnosis(NamedTuple):
 
 
 def together(causes: Sequence[Cause], left_over: float) -> Cause:
-    """One cause alone, or two as one of rank 3, of which each field has both."""
+    """One cause alone, or several as one of rank 3, of which each field has all."""
     if len(causes) == 1:
         return replace(causes[0], left_over=left_over)
 

@@ -1,7 +1,7 @@
 """Whether Mbar and h can belong together, whatever the model is; no reference is needed.
 
 Mbar must be symmetric and positive definite; h at rest must be the gradient of an energy; h - h(q, 0) must be
-quadratic in the speeds, and its power must be qd' Mdot qd / 2. Derivatives are central differences of fourth
+quadratic in the speeds. Derivatives are central differences of fourth
 order; their error is estimated with a step twice as long. Noise in the values (single precision, interpolated
 tables) is measured first, by differences of sixth order over short steps, and added to every tolerance.
 """
@@ -27,7 +27,6 @@ ORDER = 6
 CONDITIONS = {  # names and units, by the macros that say what is wrong
     "symmetric": ("M is symmetric", "kg m2"), "gradient": ("h at rest is a gradient", "N m/rad"),
     "even": ("h is even in the rates", "N m"), "quadratic": ("h is quadratic in the rates", "N m"),
-    "power": ("h belongs to M: qd'(h - h at rest) = qd' Mdot qd / 2", "W"),
 }  # fmt: skip
 
 OfPositions = Callable[[ndarray], ndarray]  # of q (states, nq) -> (states, ...)
@@ -56,10 +55,7 @@ class Condition(NamedTuple):
 def conditions(
     mass_matrix: OfPositions, bias: OfStates, coordinates: Coordinates, q: ndarray, qd: ndarray
 ) -> list[Condition]:
-    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv).
-
-    The power is evaluated only for a symmetric M, and without the part of h that is linear in the speeds.
-    """
+    """The conditions on mass_matrix(q) (states, nv, nv) and bias(q, qd) (states, nv)."""
     M, names = np.asarray(mass_matrix(q)), coordinates.speeds
     of_M = ROUNDED * np.abs(M).max(axis=(1, 2)) + SAFETY * noise(mass_matrix, coordinates, q)
     of_h = SAFETY * noise(lambda q: bias(q, qd), coordinates, q)
@@ -73,8 +69,6 @@ def conditions(
     quadratic = nearest("quadratic", np.abs(doubled - 4.0 * velocity), 4.0 * allowed, names, factor=factors)
     of_weight = gradient(lambda q: bias(q, 0.0 * qd), coordinates, q, of_h)
     tested = [symmetric(M, of_M, names), definite(M, of_M), *of_weight, even, quadratic]
-    if tested[0].is_met:
-        tested.append(power_balance(mass_matrix, coordinates, q, qd, velocity, of_M, rounding))
     return tested
 
 
@@ -134,30 +128,6 @@ def gradient(weight: OfPositions, coordinates: Coordinates, q: ndarray, floor: f
     allowed = SAFETY * (errors + np.swapaxes(errors, 1, 2)) + rounding[:, None, None]
     names, mirrored = [coordinates.speeds[k] for k in straight], np.swapaxes(slopes, 1, 2)
     return [nearest("gradient", np.abs(slopes - mirrored), allowed, names, value=slopes, mirrored=mirrored)]
-
-
-def power_balance(
-    mass_matrix: OfPositions, coordinates: Coordinates, q: ndarray, qd: ndarray, velocity: ndarray,
-    of_M: ndarray, of_h: ndarray,
-) -> Condition:  # fmt: skip
-    """qd' (h - h at rest) = qd' Mdot qd / 2, Mdot along the motion.
-
-    of_M, of_h: rounding and noise of both, (states,).
-    """
-    largest = np.abs(qd).max(axis=1).clip(min=1e-100)
-    rates = qd / largest[:, None]  # of about 1, so that the step is one of positions
-
-    def kinetic(t: float) -> ndarray:
-        M = np.asarray(mass_matrix(coordinates.move(q, t * rates)))
-        return np.einsum("si,sij,sj->s", rates, M, rates) / 2.0
-
-    slope, error, _ = derivative(kinetic)
-    power, total = np.einsum("si,si->s", rates, velocity) / largest**2, np.abs(rates).sum(axis=1)
-    allowed = SAFETY * error + total**2 * of_M / STEP + 2.0 * total * of_h / largest**2
-    watts = largest**3
-    values = {"yours": power * watts, "right": slope * watts}
-    values["balls"] = np.broadcast_to(coordinates.has_balls, watts.shape)
-    return nearest("power", np.abs(power - slope) * watts, allowed * watts, (), **values)
 
 
 def follows_from(mass_matrix: OfPositions, q: ndarray, qd: ndarray, velocity_terms: ndarray) -> bool:

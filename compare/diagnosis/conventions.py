@@ -6,7 +6,6 @@ A convention says at which state of the model the equations are, and how the use
 qd = S v. M = S' Mbar S, h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is a function in KINDS.
 """
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, combinations, permutations, product
@@ -25,13 +24,16 @@ from .cause import together
 from .model import Equations
 from .terms import speeds_of_joints
 
+FIRST, OF_NAME, OF_SLIDE = (
+    0.1,
+    0.15,
+    0.2,
+)  # costs of a sense: of the first joint, of each other, of a slide more
 PARALLEL = 1e-9  # of a cosine from 1
 MOST_PERMUTED = 6  # joints in all orders; of more, orders in which programs count, and two exchanged
 MOST_TURNED = 10  # joints with all combinations of senses
 MOST_OF_BOTH = 4  # joints whose order and senses are tried together
 MOST_ABSOLUTE = 6  # angles of which each may be measured from the world
-SIDES = re.compile(r"(?<![a-z])(left|right|l|r)(?![a-z])|^([fhbr]?)([lr])(?=_)", re.IGNORECASE)
-OTHER_SIDE = {"left": "right", "right": "left", "l": "r", "r": "l"}
 
 
 @dataclass(frozen=True)
@@ -85,11 +87,11 @@ def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[nda
 
 def stated(
     equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint],
-    rank: int = 1,
+    rank: int = 1, cost: float = 0.0,
 ) -> Convention:  # fmt: skip
     """A convention that can be stated by the joints."""
     joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
-    cause = Cause(rank=rank, kind=kind, place=place, stated=was, explains=explains)
+    cause = Cause(rank=rank, kind=kind, place=place, stated=was, explains=explains, cost=cost)
     S = np.broadcast_to(joint_map.own_forces(identity), (len(equations.q), *identity.shape))
     q, qd = joint_map.positions(equations.q), joint_map.speeds(equations.qd)
     return Convention(cause, q, qd, S, 0.0 * qd, joint_map)
@@ -106,7 +108,14 @@ def senses(equations: Equations) -> Iterator[Convention]:
     right = joints_of(equations)
     for chosen in chosen_senses(equations):
         turned = right | {name: right[name]._replace(sign=-1.0) for name in chosen}
-        yield stated(equations, "sign", f"sense of {listed(chosen)}", "+", "-", turned.values())
+        cost = cost_of(chosen, [name for name in chosen if right[name].slides])
+        place = f"sense of {listed(chosen)}"
+        yield stated(equations, "sign", place, "+", "-", turned.values(), cost=cost)
+
+
+def cost_of(joints: Sequence[str], slides: Sequence[str]) -> float:
+    """What a convention of some joints costs more."""
+    return FIRST + OF_NAME * (len(joints) - 1) + OF_SLIDE * len(slides)
 
 
 def chosen_senses(equations: Equations) -> list[tuple[str, ...]]:
@@ -135,27 +144,15 @@ def orders(equations: Equations) -> Iterator[Convention]:
 
 
 def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
-    """Orders in which programs count joints: breadth first, alphabetical, by sides, reversed; two swapped."""
+    """Orders in which programs count joints: breadth first, alphabetical, reversed; two swapped."""
     names = list(tree.joint_names)
     depth = {name: len(tree.path(i)) for i, name in enumerate(names)}
     by_depth = sorted(names, key=depth.__getitem__), sorted(names, key=lambda name: (depth[name], name))
-    sides = {name: SIDES.sub(other_side, name) for name in names}
-    by_side = list(sides.values()), sorted(names, key=sides.__getitem__)
-    for order in (*by_depth, sorted(names), *by_side, names[::-1]):
-        if sorted(order) == sorted(names):
-            yield order
+    yield from (*by_depth, sorted(names), names[::-1])
     for i, j in combinations(range(len(names)), 2):
         exchanged = list(names)
         exchanged[i], exchanged[j] = names[j], names[i]
         yield exchanged
-
-
-def other_side(match: re.Match[str]) -> str:
-    """The name of the other side: left for right, FR for FL."""
-    word, before, letter = match.groups()
-    other = OTHER_SIDE[(word or letter).lower()]
-    cased = other.upper() if (word or letter).isupper() else other
-    return (before or "") + cased
 
 
 def units(equations: Equations) -> Iterator[Convention]:
@@ -168,9 +165,14 @@ def units(equations: Equations) -> Iterator[Convention]:
 
 
 def from_the_world(equations: Equations) -> Iterator[Convention]:
-    """Angles measured from the world, not from the body before, of any of the hinges with parallel axes."""
+    """Angles or displacements measured from the world, not from the body before, of any of parallel joints."""
+    for kind, name in {"hinge": "angle", "slide": "displacement"}.items():
+        yield from absolute_coordinates(equations, kind, name)
+
+
+def absolute_coordinates(equations: Equations, kind: str, name: str) -> Iterator[Convention]:
     tree, joints = equations.tree, equations.tree.coordinates.joints
-    before = {i: hinge_before(tree, i) for i, kind in enumerate(tree.kind) if kind == "hinge"}
+    before = {i: parallel_before(tree, i) for i, other in enumerate(tree.kind) if other == kind}
     at_q, at_v = ([getattr(joints[i], name).start for i in before] for name in ("q", "qd"))
     absolute = np.eye(equations.nv)  # rows: angles from the world as sums of angles between bodies
     chained = [i for i, (parent, _) in before.items() if parent >= 0]
@@ -184,21 +186,23 @@ def from_the_world(equations: Equations) -> Iterator[Convention]:
         own[rows] = absolute[rows]
         A = np.linalg.inv(own)
         q[:, at_q] = q[:, at_q] @ A[np.ix_(at_v, at_v)].T
-        place = f"angle of {listed([tree.joint_names[i] for i in chosen])}"
+        place = f"{name} of {listed([tree.joint_names[i] for i in chosen])}"
         explains, (parent, _) = "measured from the world", before[chosen[0]]
         if len(chosen) == 1 and parent in tree.body_joint:
             explains += f", not from {tree.body_names[tree.body_joint.index(parent)]}"
         was = "between a body and the one before"
-        cause = Cause(rank=1, kind="angles", place=place, stated=was, explains=explains)
+        cost = cost_of([tree.joint_names[i] for i in chosen], ())
+        of_kind = "angles" if kind == "hinge" else "displacement"
+        cause = Cause(rank=1, kind=of_kind, place=place, stated=was, explains=explains, cost=cost)
         S = np.broadcast_to(A, (len(q), *A.shape))
         yield Convention(cause, q, equations.qd @ A.T, S, 0.0 * equations.qd)
 
 
-def hinge_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
-    """The hinge that carries hinge i and is parallel to it, or -1, and the cosine of their axes."""
-    hinges = (k for k in tree.path(tree.parent[i]) if tree.kind[k] != "slide")
-    parent = next(hinges, -1)
-    if parent < 0 or tree.kind[parent] != "hinge":
+def parallel_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
+    """The joint that carries a hinge, or a slide, of its kind and parallel to it, or -1, and the cosine of their axes."""
+    skipped = "slide" if tree.kind[i] == "hinge" else ""
+    parent = next((k for k in tree.path(tree.parent[i]) if tree.kind[k] != skipped), -1)
+    if parent < 0 or tree.kind[parent] != tree.kind[i]:
         return -1, 0.0
     joints = tree.coordinates.joints
     along = float(np.dot(tree.axis[joints[i].qd.start], tree.axis[joints[parent].qd.start]))
@@ -237,11 +241,27 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
                 yield Convention(together(causes, 0.0), own_q, own_qd, S, drift)
 
 
+def orders_of_speeds(equations: Equations) -> Iterator[Convention]:
+    """The order of the speeds where there are balls: (angular, linear) of a free joint, a hinge first."""
+    tree = equations.tree
+    if "ball" not in tree.kind:
+        return
+    of_joints, blocks = speeds_of_joints(tree), dict[str, list[int]]()
+    for name, kind in zip(tree.joint_names, tree.kind):
+        slides = next((key for key in of_joints if ", " in key and name in key.split(", ")), name)
+        blocks[slides if kind == "slide" else name] = of_joints[slides if kind == "slide" else name]
+    for order in list(permutations(blocks))[1:] if len(blocks) <= MOST_OF_BOTH else ():
+        S = np.eye(equations.nv)[:, [v for name in order for v in blocks[name]]]
+        cause = Cause(rank=1, kind="order", place="order of the speeds", stated="", explains="; ".join(order))
+        turned = np.broadcast_to(S, (len(equations.q), *S.shape))
+        yield Convention(cause, equations.q, equations.qd @ S.T, turned, 0.0 * equations.qd)
+
+
 def matrices(turn: Matrix, count: int) -> ndarray:
     """A rotation matrix of scalars (states,) as an array (states, 3, 3)."""
     return np.moveaxis(np.array([[np.broadcast_to(x, count) for x in row] for row in turn]), 2, 0)
 
 
 KINDS: tuple[Callable[[Equations], Iterator[Convention]], ...] = (
-    senses, orders, units, from_the_world, of_balls,
+    senses, orders, units, from_the_world, of_balls, orders_of_speeds,
 )  # fmt: skip

@@ -6,6 +6,7 @@ Each kind is a function in KINDS. It yields the place, what it explains, and the
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import combinations, permutations, product
+from typing import Any
 
 import numpy as np
 from numpy import ndarray
@@ -13,9 +14,10 @@ from numpy import ndarray
 import tmt
 
 from ..core.words import listed
+from ..robots.coordinates import point_inertia
+from .hypothesis import Hypothesis, hypothesis
 from .model import Changes, Equations, Frame, Path
 from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
-from .variants import Variant, variant
 
 UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
     "lengths": ((1e3, 1e2, 1e-3, 1e-2, 1.0 / 0.0254, 0.0254), ("offset", "com")),
@@ -25,14 +27,17 @@ UNITS = {  # factors of units that are taken for others, and the fields of a tre
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
+BLOCK = 64  # edits that are evaluated together
 EQUAL = 1e-12  # of a moment of inertia: two that are equal except for rounding
-Edit = tuple[str, str, dict[str, ndarray]]
+Edit = tuple[
+    Any, ...
+]  # the place, what it explains, the fields that differ; the owner of the place, of how many
 Way = Callable[[ndarray], ndarray]
 Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains
 
 
-def edits(equations: Equations) -> list[Variant]:
-    """The values with each edit that changes a number, evaluated together."""
+def edits(equations: Equations) -> Iterator[Hypothesis]:
+    """The values with each edit that changes a number."""
     stated = equations.stated
     chosen: dict[tuple[tuple[Path, str], ...], tuple[Edit, dict[Path, float]]] = {}
     for edit in (edit for kind in KINDS for edit in kind(equations)):
@@ -41,14 +46,13 @@ def edits(equations: Equations) -> list[Variant]:
             moved |= {Path(name, at): x for at, x in np.ndenumerate(field - stated[name]) if x}
         if moved:
             chosen.setdefault(tuple((path, f"{x:.12g}") for path, x in moved.items()), (edit, moved))
-    paths = dict.fromkeys(path for _, moved in chosen.values() for path in moved)
-    rows: Changes = {path: np.array([moved.get(path, 0.0) for _, moved in chosen.values()]) for path in paths}
-    kinds = {name: "body" for name, *_ in absent(equations)}
-    named = [(place, explains) for (place, explains, _), _ in chosen.values()]
-    return [
-        variant(2, kinds.get(place, "numbers"), place, "", explains, values)
-        for (place, explains), values in zip(named, equations.values(rows) if rows else ())
-    ]
+    kinds, every = {name: "body" for name, *_ in absent(equations)}, list(chosen.values())
+    for start in range(0, len(every), BLOCK):
+        block = every[start : start + BLOCK]
+        paths = dict.fromkeys(path for _, moved in block for path in moved)
+        rows: Changes = {path: np.array([moved.get(path, 0.0) for _, moved in block]) for path in paths}
+        for ((place, explains, _, *owner), _), values in zip(block, equations.values(rows)):
+            yield hypothesis(2, kinds.get(place, "numbers"), place, "", explains, values, *owner)
 
 
 def in_order(order: tuple[int, ...]) -> str:
@@ -120,7 +124,7 @@ def of_rows(equations: Equations) -> Iterator[Edit]:
                 after = equations.stated[field].copy()
                 for row in rows:
                     after[row] = in_frame(new, axes[row])(after[row])
-                yield place.format(name), explains, {field: after}
+                yield place, explains, {field: after}, name, len(rows)
 
 
 def in_frame(new: Way, frame: Frame) -> Way:
@@ -133,6 +137,29 @@ def in_frame(new: Way, frame: Frame) -> Way:
         return R @ new(R.T @ (row - origin)) + origin
 
     return change
+
+
+def parallel_axes(equations: Equations) -> Iterator[Edit]:
+    """Slips of I about another point, I + m (c'c 1 - c c'): counted again, left out, a part of it, a sign."""
+    stated = equations.stated
+    for name, bodies in sets_of_bodies(equations.tree).items():
+        ways: dict[str, ndarray] = {}
+        for b in bodies:
+            origin, R = equations.frame_of(b)
+            c, mass = R.T @ (stated["com"][b] - origin), float(stated["mass"][b])
+            moved = point_inertia(c, mass)
+            for explains, change in {
+                "about its joint, and m (c'c 1 - c c') counted again": moved,
+                "m (c'c 1 - c c') of its CoM left out": -moved,
+                "its moments about its joint, and m (c'c 1 - c c') counted again": np.where(DIAGONAL, moved, 0.0),
+                "products of m (c'c 1 - c c') left out": np.where(DIAGONAL, 0.0, -moved),
+                "m (c'c 1 - c c') on the diagonal alone": np.where(DIAGONAL, 0.0, moved),
+                "m (c'c 1 + c c') for m (c'c 1 - c c')": -2.0 * mass * np.outer(c, c),
+            }.items():  # fmt: skip
+                after = ways.setdefault(explains, stated["inertia"].copy())
+                after[b] = after[b] + R @ change @ R.T
+        for explains, after in ways.items():
+            yield "inertia of {}", explains, {"inertia": after}, name, len(bodies)
 
 
 def about_one_axis(equations: Equations) -> Iterator[Edit]:
@@ -267,5 +294,5 @@ def angles_of(turn: ndarray) -> ndarray:
 
 
 KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
-    absent, concentrated, of_rows, about_one_axis, swapped, scaled, axes, turns,
+    absent, concentrated, of_rows, parallel_axes, about_one_axis, swapped, scaled, axes, turns,
 )  # fmt: skip

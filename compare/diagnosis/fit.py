@@ -14,7 +14,7 @@ from numpy import ndarray
 from ..core.cause import Cause
 from .cause import together
 from .model import TINY, Changes, Path
-from .places import OF_ZERO, Place
+from .places import FIT_ROUNDING, OF_ZERO, Place
 
 ROUNDS = 25  # of a search from one start
 FIRST_ROUNDS, FINALISTS = 6, 24  # after these rounds only the best go on
@@ -23,8 +23,10 @@ SEEN = 1e-100  # of the square of a derivative, in tolerances
 LEAST = 1e-12  # damping of a step, of the diagonal: two places may do the same
 PROMISING = 1e-4  # of the difference: places that leave more, to second order, are not fitted
 NEARLY = 5e-13  # of the difference: what an explanation may leave as rounding
+NEAR_ZERO = 1e-6  # of the size of a number
+NEAR_PAIRS, THIRDS = 8, 4  # pairs beside which a third number is sought, and how many of these
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
-ROWS = 256  # of changes in one evaluation
+NUMBERS = 1_000_000  # in one evaluation, about, of changes: each has nv^2 at each state
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # more starts for the zero of a hinge
 
 
@@ -42,7 +44,12 @@ class Fitted(NamedTuple):
 
     @property
     def explains(self) -> bool:
-        return self.ratio <= 1.0 and self.is_possible
+        """Whether it leaves nothing, and each of several places has a part in that."""
+        pairs = zip(self.places, self.changes)
+        acts = len(self.places) == 1 or all(
+            abs(change) > FIT_ROUNDING * place.size for place, change in pairs
+        )
+        return self.ratio <= 1.0 and self.is_possible and acts
 
     @property
     def cause(self) -> Cause:
@@ -59,7 +66,7 @@ class Search:
 
     computed: the values with changes of numbers of the model, (changes, states, entries). given: (states,
     entries); NaN where nothing is given. tolerance: of each entry, (states, entries). end: the
-    time.process_time() at which OutOfTime is raised.
+    time.monotonic() at which OutOfTime is raised.
     """
 
     def __init__(
@@ -76,12 +83,28 @@ class Search:
         self.size = float(np.linalg.norm(self.off))
         self.sizes = np.array([place.size for place in self.places])
 
+    def in_time(self) -> None:
+        """OutOfTime, if it is."""
+        if time.monotonic() > self.end:
+            raise OutOfTime
+
     def within(self, entries: ndarray) -> "Search":
         """The search of what explains some entries (entries,), whatever the others are."""
         part = copy(self)
         part.known, part.weight = self.known & entries, self.weight * entries
         part.off = part.weighted(part.right)
         part.size = float(np.linalg.norm(part.off))
+        return part
+
+    def at(self, states: ndarray) -> "Search":
+        """The search at some of the states, of places that are a column and of given changes."""
+        part = copy(self)
+        part.given, part.known, part.weight = self.given[states], self.known[states], self.weight[states]
+        part.tolerance, part.right, part.off = self.tolerance[states], self.right[states], self.off[states]
+        part.size = float(np.linalg.norm(part.off)) or 1.0
+        if "coefficients" in self.__dict__:
+            first, second = self.coefficients
+            part.__dict__["coefficients"] = first[:, states], second[:, states]
         return part
 
     def weighted(self, values: ndarray) -> ndarray:
@@ -105,11 +128,11 @@ class Search:
 
     def values(self, numbers: ndarray, x: ndarray) -> ndarray:
         """Values for each row of changes x of the places `numbers`, (rows, k): (rows, states, entries)."""
-        if len(numbers) > ROWS:
-            starts = range(0, len(numbers), ROWS)
-            return np.concatenate([self.values(numbers[k : k + ROWS], x[k : k + ROWS]) for k in starts])
-        if time.process_time() > self.end:
-            raise OutOfTime
+        rows = max(4, NUMBERS // self.right.size)
+        if len(numbers) > rows:
+            starts = range(0, len(numbers), rows)
+            return np.concatenate([self.values(numbers[k : k + rows], x[k : k + rows]) for k in starts])
+        self.in_time()
         changes: dict[Path, ndarray] = {}
         columns = []
         for row in range(len(numbers)):
@@ -179,8 +202,40 @@ class Search:
                 fits.append(Fitted((place,), (best * place.size,), np.inf, left / self.size))
         if starts:
             numbers, x = zip(*starts)
-            fits += self.outcome(np.array(numbers)[:, None], np.array(x)[:, None])
+            fits += map(self.at_zero, self.outcome(np.array(numbers)[:, None], np.array(x)[:, None]))
         return fits
+
+    def at_zero(self, fit: Fitted) -> Fitted:
+        """A fit of one place, at zero where that explains as much: a double root is found to half the digits."""
+        (place,), (change,) = fit.places, fit.changes
+        if (
+            fit.ratio > 1.0
+            or place.kind == OF_ZERO
+            or not 0.0 < abs(place.stated + change) < NEAR_ZERO * place.size
+        ):
+            return fit
+        k = next(k for k, other in enumerate(self.places) if other is place)
+        left = self.weighted(self.values(np.array([[k]]), np.array([[-place.stated]]))[0])
+        ratio, share = self.left_over(left)
+        return fit._replace(changes=(-place.stated,), ratio=ratio, left_over=share) if ratio <= 1.0 else fit
+
+    def thirds(self, fits: Sequence[Fitted]) -> list[Fitted]:
+        """A third number beside the pairs that leave least."""
+        first, _ = self.expansion
+        columns = first.reshape(len(self.places), -1)
+        lengths = np.linalg.norm(columns, axis=1)
+        columns = columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+        index = {id(place): k for k, place in enumerate(self.places)}
+        numbers, starts = [], []
+        for fit in sorted(fits, key=lambda fit: fit.left_over)[:NEAR_PAIRS]:
+            pair = [index[id(place)] for place in fit.places]
+            left = self.weighted(self.values(np.array([pair]), np.array([fit.changes]))[0]).ravel()
+            along = columns @ left
+            likely = (k for k in np.argsort(-np.abs(along)).tolist() if self.places[k].kind == "number")
+            for k in [k for k in likely if k not in pair][:THIRDS]:
+                numbers.append([*pair, k])
+                starts.append([*fit.changes, along[k] / lengths[k] * self.sizes[k]])
+        return self.outcome(np.array(numbers), np.array(starts)) if numbers else []
 
     @property
     def expansion(self) -> tuple[ndarray, ndarray]:

@@ -21,10 +21,10 @@ from ..judge.agree import share_of
 from ..judge.entries import Entries
 from .cause import TEMPLATE, ranked
 from .fit import Search
+from .hypothesis import Hypothesis, option
 from .likelihood import cost
 from .model import ROUNDED, Equations, Values
 from .places import Place, factor, forces
-from .variants import Variant, option
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
@@ -38,6 +38,7 @@ class LeftOver:
     def __init__(self, tree: tmt.Tree, values: Values, tau: ndarray, qdd: ndarray, rounding: float = ROUNDED):
         self.tree, self.values, self.tau = tree, values, tau
         q, qd, M, h, _ = values
+        self.of_speed = [i for i, joint in enumerate(tree.coordinates.joints) for _ in tree.axis[joint.qd]]
         self.damping, self.springs = np.array(tree.damping) * qd, literal.spring_torque(q, tree)
         self.force = tau - self.damping - self.springs - h - np.einsum("sij,sj->si", M, qdd)
         scale = Entries(tree, q, qd)
@@ -74,7 +75,7 @@ class LeftOver:
         for body, added in zip(self.tree.body_names, equations.terms["gravity"]):
             yield factor("term", f"gravity of {body} in the acceleration", added[:, equations.in_h])
 
-    def options(self) -> Iterator[Variant]:
+    def options(self) -> Iterator[Hypothesis]:
         """Each option, and the force that is left over with it."""
         terms = {"torque": ("tau", -self.tau), "bias": ("- h", self.values.bias)}
         terms |= {"damping": ("- D qd", self.damping), "springs": ("- k (q - rest)", self.springs)}
@@ -83,3 +84,15 @@ class LeftOver:
             place = f"{name} in the acceleration"
             if term.any():
                 yield option(place, stated, explains, factors[explains] * term)
+        if self.springs.any():
+            slack = (
+                np.array(self.tree.stiffness)[self.of_speed]
+                * self.values.q[:, self.tree.coordinates.first_positions]
+            )
+            place = "springs in the acceleration"
+            yield option(place, "- k (q - rest)", "at rest at zero", slack - self.springs)
+        h, M = self.values.bias, self.values.mass_matrix
+        for inside, force in {"(tau - D qd)": h, "tau": h + self.damping + self.springs}.items():
+            solved = np.einsum("sij,sj->si", M, force) - force
+            wrong = f"inv(M) {inside} - h: h is not multiplied by inv(M)"
+            yield option("how you solve for the acceleration", "inv(M) (tau - D qd - h)", wrong, solved)

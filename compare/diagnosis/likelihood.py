@@ -5,19 +5,19 @@ from math import log10
 import numpy as np
 
 from ..core.cause import Cause
+from .groups import numbers_in
 from .model import Equations
 from .places import OF_ZERO, is_common
 
 NATURAL = 1.0  # a cause that costs less is said; the others only if there is no such
 OF_KINDS = {  # what a cause of a kind costs, besides its numbers
-    "option": 0.0, "sign": 0.0, "angles": 0.0, "number": 0.0, OF_ZERO: 0.05, "unit": 0.1, "body": 0.12,
-    "axes": 0.15, "term": 0.15, "part": 0.16, "force": 0.2, "numbers": 0.2, "order": 0.25, "slip": 0.3,
-    "coefficient": 0.3, "added": 0.3, "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.5,
+    "option": 0.0, "sign": 0.0, "angles": 0.0, "displacement": 0.1, "number": 0.0, OF_ZERO: 0.05, "unit": 0.1, "body": 0.12,
+    "axes": 0.15, "term": 0.15, "part": 0.3, "force": 0.2, "cross": 0.3, "numbers": 0.2, "order": 0.25, "slip": 0.3,
+    "coefficient": 0.3, "whole": 0.3, "added": 0.3, "derivative": 0.36, "angle": 0.45, "load": 0.6, "several": 0.5,
 }  # fmt: skip
-OF_NAME, ADDED, PAIR = 0.1, 0.1, 0.3  # for each joint that is named; a number that was 0; a second cause
-IN_PART, CONVENTION_IN_PART = 0.12, 0.2  # of a slip in some parts alone; of a convention more
-OF_WORDS = {"every": 0.03, "damping added": 0.1, "R' I R": -0.05}  # in a place
-ALONE = " alone", "but not in gravity", "but not in the velocity terms of h"
+ADDED, PAIR = 0.1, 0.3  # a number that was 0, a second cause
+IN_PART, CONVENTION_IN_PART = 0.12, 0.32  # of a slip, of a convention in some parts alone
+CONVENTIONS = "sign", "axes", "angles", "displacement", "unit", "order"  # kinds
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
 
 
@@ -25,21 +25,18 @@ def cost(cause: Cause, equations: Equations) -> float:
     """A number that is smaller the likelier a cause is."""
     if len(cause.parts) > 1:
         return PAIR + sum(cost(part, equations) for part in cause.parts)
-    words = sum(more for word, more in OF_WORDS.items() if word in cause.place)
-    in_part = IN_PART + CONVENTION_IN_PART * (cause.kind in ("sign", "axes", "angles", "unit", "order"))
-    return of_one(cause, equations) + words + in_part * cause.place.endswith(ALONE)
+    return of_one(cause, equations) + cause.cost
+
+
+def in_part(cause: Cause) -> float:
+    """What a cause costs more that is in some parts of the equations alone."""
+    return CONVENTION_IN_PART if cause.kind in CONVENTIONS else IN_PART
 
 
 def of_one(cause: Cause, equations: Equations) -> float:
     base, value = OF_KINDS.get(cause.kind, 0.5), cause.explains
-    if cause.kind in ("sign", "angles"):
-        kinds = dict(zip(equations.coordinates.names, equations.coordinates.all_kinds))
-        words = cause.place.replace(",", " ").split()
-        slides = sum(kinds.get(word) == "slide" for word in words)
-        return base + OF_NAME * (1 + cause.place.count(",") + words.count("and")) + 0.15 * slides
     if cause.kind == "several":
-        numbers, stated_numbers = (map(float, str(those).split(", ")) for those in (value, cause.stated))
-        pairs = zip(numbers, stated_numbers)
+        pairs = zip(numbers_in(str(value)), numbers_in(str(cause.stated)))
         return base + float(np.mean([of_number(x, right, equations) for x, right in pairs]))
     if not isinstance(value, float):
         return base
@@ -50,19 +47,17 @@ def of_one(cause: Cause, equations: Equations) -> float:
         quarters = (value - stated) / (np.pi / 2.0)
         is_quarter = abs(quarters - round(quarters)) < 1e-9
         return base + (0.05 if is_quarter else of_number(np.degrees(value), stated, equations))
-    is_massless = cause.place.startswith("mass of") and value == 0.0
-    is_rare = cause.place.startswith(("anchor", "armature"))
     added = ADDED * (stated == 0.0 and cause.kind != OF_ZERO)
-    return base + of_number(value, stated, equations) + added + 0.2 * is_massless + 0.15 * is_rare
+    return base + of_number(value, stated, equations) + added
 
 
 def of_factor(factor: float, equations: Equations) -> float:
-    """A common factor costs little, degrees for rad a little, a length or one over a length more."""
+    """A common factor costs little, degrees for rad a little, a length or a mass, or one over it, more."""
     if is_common(factor):
         return 0.0
     if np.isclose(abs(log10(abs(factor))), log10(180.0 / np.pi), rtol=1e-9):
         return 0.1
-    lengths = np.abs(np.concatenate([equations.stated["offset"].ravel(), equations.stated["com"].ravel()]))
+    lengths = np.abs(np.concatenate([equations.stated[name].ravel() for name in ("offset", "com", "mass")]))
     lengths = lengths[lengths > 0.0]
     is_power = np.isclose(np.concatenate([lengths, 1.0 / lengths]), abs(factor), rtol=1e-9, atol=0.0).any()
     return 0.3 if is_power else UNUSUAL

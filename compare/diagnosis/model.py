@@ -137,6 +137,12 @@ class Equations:
         self.joints = dict(zip(tree.joint_names, tree.coordinates.joints))
         self.stated = {name: np.array(getattr(tree, name), float) for name in FIELDS}
 
+    def at(self, states: ndarray) -> "Equations":
+        """The same at some of the states."""
+        qdd = self.layout.qdd
+        layout = self.layout if qdd is None else self.layout._replace(qdd=qdd[states])
+        return Equations(self.tree, self.q[states], self.qd[states], layout)
+
     @cached_property
     def entries(self) -> list[Entry]:
         """The entries of Mbar and h, those of Mbar first."""

@@ -5,8 +5,8 @@ entries of Mbar or h. The zero of a joint is a convention and has rank 1; the ot
 """
 
 from collections.abc import Iterable, Iterator
-from itertools import chain, product
-from typing import NamedTuple
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from ..core.cause import Cause
 from ..core.words import listed
 from ..robots.coordinates import Coordinates
 from ..robots.joint_map import within_a_turn
-from .model import WHOLE, Equations, Frame, Path
+from .hypothesis import EVERY
+from .model import MOST_SPEEDS, WHOLE, Equations, Frame, Path
 
 XYZ = "xyz"
 INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2), ("yz", 1, 2))
@@ -29,6 +30,11 @@ READ_ANGLES = np.concatenate([np.degrees(COMMON_ANGLES), np.radians(COMMON_ANGLE
 MEANT_ANGLES = np.tile(COMMON_ANGLES, 2)
 WRITTEN = 1e-6  # of a turn: what the digits of an angle leave
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
+RARE, MASSLESS, OF_ALL = (
+    0.15,
+    0.2,
+    0.1,
+)  # what an anchor or armature, no mass, damping of all joints cost more
 SMALL = 1e-9  # of the other numbers: a number that a regression leaves at 0
 ALL = slice(None)  # entries of a state
 ONE = np.array(1.0)
@@ -40,7 +46,7 @@ OF_SLIDES = {"N m s/rad": "N s/m", "N m/rad": "N/m", "N m": "N", "kg m2": "kg", 
 class Place(NamedTuple):
     """One number that can be wrong."""
 
-    kind: str  # "number", "force", "term", "part" of a term, "coefficient" or OF_ZERO
+    kind: str  # "number", "force", "term", "part" of a term, "coefficient", "whole" or OF_ZERO
     name: str
     stated: float
     unit: str
@@ -48,6 +54,9 @@ class Place(NamedTuple):
     moves: tuple[tuple[Path, float], ...] = ()  # numbers of the tree, and how far they go with a change of 1
     column: np.ndarray | None = None  # what a change of 1 adds to the values instead, (states, entries)
     least: float = -np.inf  # possible value
+    cost: float = 0.0  # beside that of its kind and value
+    form: str = ""  # as of a Cause
+    owners: int = 1
 
     @property
     def rank(self) -> int:
@@ -64,8 +73,9 @@ class Place(NamedTuple):
         return 0.0 if abs(value) < FIT_ROUNDING * self.size else float(value)
 
     def is_possible(self, change: float) -> bool:
-        """Whether no mass, inertia, damping or stiffness is below zero."""
-        return self.value(change) >= self.least
+        """Whether no mass, inertia, damping or stiffness is below zero, except the right one with the other sign."""
+        value = self.value(change)
+        return value >= self.least or bool(self.stated and np.isclose(value, -self.stated, rtol=SMALL))
 
     def cause(self, change: float) -> Cause:
         """The change as a cause; of a zero whose angle is read in another unit, both angles."""
@@ -76,14 +86,27 @@ class Place(NamedTuple):
                 meant, read = abs(float(MEANT_ANGLES[k])), abs(float(READ_ANGLES[k]))
                 return Cause(rank=2, kind="number", place=place, stated=meant, explains=read, unit=unit)
         stated, explains = float(self.stated), self.value(change)
-        return Cause(rank=self.rank, kind=self.kind, place=place, stated=stated, explains=explains, unit=unit)
+        field = self.moves[0][0].field if self.moves else ""
+        cost = self.cost + EVERY * (self.owners > 1) + MASSLESS * (field == "mass" and explains == 0.0)
+        if field == "armature" and not (stated and is_common(explains / stated)):
+            cost += RARE
+        about: dict[str, Any] = {
+            "rank": self.rank,
+            "kind": self.kind,
+            "place": place,
+            "form": self.form,
+            "owners": self.owners,
+        }
+        return Cause(stated=stated, explains=explains, unit=unit, cost=cost, **about)
 
 
-def factor(kind: str, name: str, column: np.ndarray, entries: Entries = ALL, stated: float = 1.0) -> Place:
+def factor(
+    kind: str, name: str, column: np.ndarray, entries: Entries = ALL, stated: float = 1.0, **more: Any
+) -> Place:
     """The factor of what some entries of a column (states, entries) are; 1 is right."""
     chosen = np.zeros_like(column)
     chosen[:, entries] = column[:, entries]
-    return Place(kind, name, stated, "times", 1.0, column=chosen)
+    return Place(kind, name, stated, "times", 1.0, column=chosen, **more)
 
 
 def unit_of(unit: str, kind: str) -> str:
@@ -120,8 +143,40 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
                 yield place(f"stiffness of {names[v]}", of_stiffness, tree.stiffness[i], stretched)
             if not has_spring:
                 yield place(f"constant force at {names[v]}", of_force, 0.0, constant, -np.inf)
+    yield from others(tree, q, qd)
     if len(tree.joint_names) > 1:
-        yield place("damping added to every joint", "N m s/rad", 0.0, qd)
+        yield place("damping added to every joint", "N m s/rad", 0.0, qd)._replace(cost=OF_ALL)
+
+
+def others(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Place]:
+    """Forces at a hinge or slide of the speed or displacement of another one, or of the cube of its own."""
+    straight = [(i, joint) for i, joint in enumerate(tree.coordinates.joints) if joint.kind != "ball"]
+    for (i, joint), (k, other) in product(straight, straight) if len(straight) <= MOST_SPEEDS else ():
+        name, of_other = tree.joint_names[i], tree.joint_names[k]
+        force, at_joint = unit_of("N m", joint.kind), np.eye(qd.shape[1])[joint.qd.start]
+        moved = q[:, other.q] - tree.reference[k]
+        unit = "m" if other.kind == "slide" else "rad"
+        if i == k:
+            yield Place(
+                "cross",
+                f"force at {name} of {name}^3",
+                0.0,
+                f"{force}/{unit}3",
+                1.0,
+                column=moved**3 * at_joint,
+            )
+            continue
+        column = qd[:, other.qd] * at_joint
+        yield Place(
+            "cross",
+            f"force at {name} of the speed of {of_other}",
+            0.0,
+            f"{force} s/{unit}",
+            1.0,
+            column=column,
+        )
+        column = moved * at_joint
+        yield Place("cross", f"force at {name} of {of_other}", 0.0, f"{force}/{unit}", 1.0, column=column)
 
 
 def numbers(equations: Equations) -> Iterator[Place]:
@@ -165,7 +220,7 @@ def numbers(equations: Equations) -> Iterator[Place]:
                 pairs = product(carried, place.moves)
                 stays = [(Path(field, (index, path.at[1])), -x) for (field, index), (path, x) in pairs]
                 anchor = place.name.replace("offset", "anchor", 1)
-                yield place._replace(name=anchor, moves=(*place.moves, *stays))
+                yield place._replace(name=anchor, moves=(*place.moves, *stays), cost=RARE)
         if joint.kind != "ball":
             size = length if joint.kind == "slide" else 1.0
             zero = number(f"zero of {name}", unit_of("rad", joint.kind), size, Path("reference", (i,)))
@@ -179,47 +234,22 @@ def numbers(equations: Equations) -> Iterator[Place]:
     yield from triple("gravity {}", "m/s2", 9.81, Path("gravity", ()), Frame(np.zeros(3), np.eye(3)))
 
 
-def tied(equations: Equations) -> Iterator[Place]:
-    """The same number of bodies or joints that are alike, as a left and a right one, changed together."""
-    every = [place for place in numbers(equations) if place.kind == "number" and place.is_quadratic]
-    for names in alike(equations.tree):
-        of_each = [[place for place in every if place.name.endswith(f" of {name}")] for name in names]
-        for same in zip(*of_each):
-            name, moves = same[0].name.removesuffix(names[0]) + listed(names), (place.moves for place in same)
-            yield same[0]._replace(name=name, moves=tuple(chain.from_iterable(moves)))
-
-
-def alike(tree: tmt.Tree) -> Iterator[list[str]]:
-    """The names of bodies with the same numbers, and of joints that carry them and have the same numbers."""
-    bodies: dict[str, list[int]] = {}
-    for b in range(len(tree.mass)):
-        bodies.setdefault(repr((tree.mass[b], tree.com[b], tree.inertia[b])), []).append(b)
-    for same in bodies.values():
-        joints = [tree.body_joint[b] for b in same]
-        numbers_of_joints = {repr((tree.kind[i], tree.offset[i])) for i in joints}
-        if len(same) > 1:
-            yield [tree.body_names[b] for b in same]
-            if len(numbers_of_joints) == 1 and min(joints) >= 0:
-                yield [tree.joint_names[i] for i in joints]
-
-
 def sets_of_bodies(tree: tmt.Tree) -> dict[str, list[int]]:
-    """Each body, those that are alike, and all."""
-    return sets_of(list(tree.body_names), alike(tree), EVERY_BODY)
+    """Each body, and all."""
+    return sets_of(list(tree.body_names), (), EVERY_BODY)
 
 
 def sets_of_joints(tree: tmt.Tree) -> dict[str, list[int]]:
-    """Each joint, hinges about equal axes, joints that are alike, and all."""
+    """Each joint, hinges about equal axes, and all."""
     axes: dict[str, list[str]] = {}
     for name, joint in zip(tree.joint_names, tree.coordinates.joints):
         if joint.kind == "hinge":
             axes.setdefault(repr(tree.axis[joint.qd.start]), []).append(name)
-    return sets_of(list(tree.joint_names), [*axes.values(), *alike(tree)], "every joint")
+    return sets_of(list(tree.joint_names), axes.values(), "every joint")
 
 
 def sets_of(names: list[str], together: Iterable[list[str]], every: str) -> dict[str, list[int]]:
     sets = {name: [i] for i, name in enumerate(names)}
     for those in together:
-        if set(those) <= set(names):
-            sets[listed(those)] = [names.index(name) for name in those]
+        sets[listed(those)] = [names.index(name) for name in those]
     return sets | ({every: list(range(len(names)))} if len(names) > 1 else {})

@@ -1,10 +1,11 @@
-"""Mbar and h by the recursion of Newton and Euler with one slip: motion outward, forces inward.
+"""Mbar and h by the recursion of Newton and Euler with one slip: motion outward, forces and moments inward.
 
-A slip is a record in SLIPS: the step that it changes, its name, where it is made. A step's wrong values are
-where `Recursion.step` is called with its name. Arrays are (rows, 3), in the world's axes.
+A slip is a record in SLIPS: the step that it changes, its place, what is wrong there, where it is made. A step's
+wrong values are where `Recursion.step` is called with its name. Mbar are the forces of unit accelerations, h
+those without acceleration. Arrays are (rows, 3), in the world's axes.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -14,84 +15,67 @@ from numpy import ndarray
 import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
-from ..robots.coordinates import point_inertia
 from .conventions import matrices
-from .model import MOST_SPEEDS, Equations
+from .hypothesis import Hypothesis, slip
+from .model import Equations
 from .places import sets_of_bodies, sets_of_joints
-from .variants import Variant, slip
 
 
 class Slip(NamedTuple):
     """One slip."""
 
     step: str
-    name: str
+    place: str
+    wrong: str
     at: str = "joint"
 
 
 Wrong = Callable[[], ndarray]  # the wrong values of a step
-AXES = "to the axes of the body before"
+AXES = "not turned to the axes of the body before"
 SLIPS = (
-    Slip("order", "order of rotations at {}: its turn before those of the joints that carry it"),
-    Slip("transposed", "rotation of {} transposed, R' for R"),
-    Slip("absolute", "rotation of {} not combined with those of the joints that carry it"),
-    Slip("axis", "axis of {} not turned to the inertial frame"),
-    Slip("axis in B", "axis of {} not turned to the inertial frame in the angular velocities"),
-    Slip("lever", "lever of {} measured from the origin of the world, not from the joint"),
-    Slip("lever from the first", "lever of {} measured from the first joint"),
-    Slip("lever from the joint before", "lever of {} measured from the joint before"),
-    Slip("column", "column of T of {} left out", "joint and body"),
-    Slip("carried back", "angular velocity passed on to {} with R for R'"),
-    Slip("carried as it is", "angular velocity passed on to {} not turned to its axes"),
-    Slip("relative", "angular velocity of {} relative to the body before, not to the world"),
-    Slip("alpha", "convective angular acceleration omega x axis qd of {} left out"),
-    Slip("coriolis", "Coriolis acceleration 2 omega x axis qd of {} left out"),
-    Slip("base", "acceleration of the joint before {} left out"),
-    Slip("base of body", "acceleration of the joint left out in that of the CoM of {}", "body"),
-    Slip("centripetal of offset",
-         "centripetal acceleration omega x (omega x o) of the offset of {} left out"),
-    Slip("centripetal", "centripetal acceleration omega x (omega x c) of the CoM of {} left out", "body"),
-    Slip("offset outward", "acceleration alpha x o of the offset of {} left out"),
-    Slip("CoM outward", "acceleration alpha x c of the CoM of {} left out", "body"),
-    Slip("not turned", "inertia of {} not turned to the inertial frame", "body"),
-    Slip("turned back", "R' I R for R I R' of {}", "body"),
-    Slip("turned back", "R for R' in the angular velocity of {}", "body"),
-    Slip("world axes", "inertia of {} in world axes, R I R', for one in its own axes", "body"),
-    Slip("about the joint", "inertia of {} about its joint and mass counted again", "body"),
-    Slip("parallel axis", "parallel-axis term m (c'c 1 - c c') of {} left out", "body"),
-    Slip("relative B",
-         "angular velocity of {} relative to the body before, not to the world, in its rotation", "body"),
-    Slip("column of B", "speed of {} left out of the angular velocity", "joint and body"),
-    Slip("CoM inward", "moment c x F of the force at the CoM of {} left out", "body"),
-    Slip("sign inward", "moment c x F of the force at the CoM of {} with the other sign", "body"),
-    Slip("offset inward", "moment of the force passed on by {} left out"),
-    Slip("CoM for offset inward",
-         "lever of the force passed on by {}: the CoM of the body before instead of the offset"),
-    Slip("force turned back", "force passed on by {} turned with R' for R"),
-    Slip("force not turned", f"force passed on by {{}} not turned {AXES}"),
-    Slip("moment turned back", "moment passed on by {} turned with R' for R"),
-    Slip("moment not turned", f"moment passed on by {{}} not turned {AXES}"),
-    *(Slip(f"sines of components {two}",
-           f"sine and cosine exchanged in the position of the CoM of {{}} ({two})", "body")
-      for two in ("xy", "xz", "yz")),
-    *(Slip(f"angle of components {k}",
-           f"angle from the joint before for that from the world in {k} of the CoM of {{}}", "body")
-      for k in "xyz"),
-    *(Slip(f"signs of components {k}", f"sign of {k} of the CoM of {{}} from its joint", "body")
-      for k in "xyz"),
+    Slip("order", "rotation of {}", "before those of the joints that carry it"),
+    Slip("transposed", "rotation of {}", "transposed, R' for R"),
+    Slip("absolute", "rotation of {}", "not combined with those of the joints that carry it"),
+    Slip("axis", "axis of {}", "not turned to the inertial frame"),
+    Slip("axis before", "axis of {}", "not turned by the joint before"),
+    Slip("com", "CoM of {}", "not turned to the inertial frame", "body"),
+    Slip("com before", "CoM of {}", "not turned by its own joint", "body"),
+    Slip("alpha", "convective angular acceleration omega x axis qd of {}", "left out"),
+    Slip("minus alpha", "convective angular acceleration omega x axis qd of {}", "of the other sign"),
+    Slip("offset", "centripetal acceleration omega x (omega x o) of the offset of {}", "left out"),
+    Slip("centripetal", "centripetal acceleration omega x (omega x c) of the CoM of {}", "left out", "body"),
+    Slip("own motion", "acceleration of the offset of {}", "with the motion of the body that it carries"),
+    Slip("a", "acceleration passed on to {}", "not turned to its axes"),
+    Slip("base", "acceleration passed on to {}", "left out"),
+    Slip("relative", "angular velocity of {} in the accelerations", "relative to the body before, not to the world"),
+    Slip("carried back", "angular velocity passed on to {}", "turned with R for R'"),
+    Slip("both back", "angular velocity and acceleration passed on to {}", "turned with R for R'"),
+    Slip("offset for CoM", "acceleration of the CoM of {}", "with the offset of the next joint for its CoM", "body"),
+    Slip("first omega", "omega x I omega of {}", "with the angular velocity of the first body", "body"),
+    Slip("alpha for omega", "omega x I omega of {}", "omega x I alpha", "body"),
+    Slip("CoM", "moment c x F of the force at the CoM of {}", "left out", "body"),
+    Slip("minus CoM", "moment c x F of the force at the CoM of {}", "of the other sign", "body"),
+    Slip("lever", "moment c x F of the force at the CoM of {}", "o x F, with the offset of its joint for its CoM", "body"),
+    Slip("com for offset", "lever of the force passed on by {}", "the CoM of the body before instead of the offset"),
+    Slip("moment", "moment of the force passed on by {}", "left out"),
+    Slip("minus moment", "moment of the force passed on by {}", "of the other sign"),
+    Slip("n", "moment passed on by {}", "left out"),
+    Slip("force turned back", "force passed on by {}", "turned with R' for R"),
+    Slip("force", "force passed on by {}", AXES),
+    Slip("next axis", "axis of {} in its torque", "that of the next joint"),
 )  # fmt: skip
 
 
 class Frame(NamedTuple):
-    """A joint's frame and its motion at qdd = 0."""
+    """A joint's frame and its motion."""
 
     turn: ndarray  # (rows, 3, 3)
-    origin: ndarray
+    own: ndarray  # its turn in its parent's frame, (rows, 3, 3)
+    arm: ndarray  # from the joint before, (rows, 3)
     axes: list[ndarray]
     omega: ndarray
     alpha: ndarray
     a: ndarray  # of the origin
-    own: ndarray  # its turn in its parent's frame, (rows, 3, 3)
     passed: ndarray  # omega as its children take it
     slides: bool = False
 
@@ -104,23 +88,32 @@ def backward(R: ndarray) -> ndarray:
     return np.swapaxes(R, 1, 2)
 
 
-def crossing(r: ndarray) -> ndarray:
-    """The matrices (rows, 3, 3) of r x ..."""
-    return np.cross(r[:, None, :], np.eye(3)).swapaxes(1, 2)
-
-
 def centripetal(omega: ndarray, r: ndarray) -> ndarray:
     return np.cross(omega, np.cross(omega, r))
 
 
 class Recursion:
-    """Mbar and h with a slip at some joints or bodies. at: (joints or bodies, rows), where it is made."""
+    """Forces with a slip at some joints or bodies. at: (joints or bodies, rows), where it is made.
 
-    def __init__(self, tree: tmt.Tree, q: ndarray, qd: ndarray, slip: str = "", at: ndarray | None = None):
-        self.tree, self.q, self.qd, self.slip, self.at, self.rows = tree, q, qd, slip, at, len(q)
+    q (rows, nq), qd, qdd (rows, nv), gravity (rows, 3).
+    """
+
+    def __init__(
+        self, tree: tmt.Tree, q: ndarray, qd: ndarray, qdd: ndarray, gravity: ndarray, slip: str = "",
+        at: ndarray | None = None,
+    ):  # fmt: skip
+        self.tree, self.q, self.qd, self.qdd, self.slip, self.at, self.rows = (
+            tree,
+            q,
+            qd,
+            qdd,
+            slip,
+            at,
+            len(q),
+        )
         self.joints, zero = tree.coordinates.joints, np.zeros((len(q), 3))
         self.identity = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-        self.world = Frame(self.identity, zero, [], zero, zero, zero, self.identity, zero)
+        self.world = Frame(self.identity, self.identity, zero, [], zero, zero, -gravity, zero)
         self.frames: list[Frame] = []
         for i in range(len(tree.parent)):
             self.frames.append(self.frame(i))
@@ -132,9 +125,6 @@ class Recursion:
         where = self.at[index].reshape(-1, *[1] * (right.ndim - 1))
         return np.where(where, wrong() if wrong else 0.0, right)
 
-    def everywhere(self, vector: Sequence[float]) -> ndarray:
-        return np.broadcast_to(np.array(vector), (self.rows, 3))
-
     def before(self, i: int) -> Frame:
         return self.frames[self.tree.parent[i]] if self.tree.parent[i] >= 0 else self.world
 
@@ -142,168 +132,126 @@ class Recursion:
         """The frame of a joint, outward."""
         step, joint, parent, columns = self.step, self.joints[i], self.before(i), list(self.q.T)
         offset = [np.broadcast_to(x, self.rows) for x in origin_in_parent(self.tree, i, columns)]
-        r, omega = rotated(parent.turn, np.stack(offset, axis=-1)), parent.omega
-        a = parent.a + step("centripetal of offset", i, centripetal(omega, r))
-        a = a + step("offset outward", i, np.cross(parent.alpha, r))
-        a = step("base", i, a, lambda: a - parent.a)
-        local, rates = [self.everywhere(axis) for axis in self.tree.axis[joint.qd]], self.qd[:, joint.qd]
+        arm, omega = rotated(parent.turn, np.stack(offset, axis=-1)), parent.omega
+        local = [np.broadcast_to(axis, arm.shape) for axis in np.array(self.tree.axis[joint.qd])]
+        rates, forced = self.qd[:, joint.qd], self.qdd[:, joint.qd]
         if joint.kind == "slide":
             axis = step("axis", i, rotated(parent.turn, local[0]), lambda: local[0])
-            a = a + step("coriolis", i, 2.0 * np.cross(omega, axis * rates))
-            return parent._replace(origin=parent.origin + r, axes=[axis], a=a, own=self.identity, slides=True)
+            a = parent.a + self.carried(i, arm, omega, parent.alpha) + axis * forced
+            a = a + 2.0 * np.cross(omega, axis * rates)
+            return parent._replace(own=self.identity, arm=arm, axes=[axis], a=a, slides=True)
         own = matrices(turn_in_parent(self.tree, i, columns), self.rows)
         turn = parent.turn @ step("transposed", i, own, lambda: backward(own))
         turn = step("order", i, turn, lambda: own @ parent.turn)
         turn = step("absolute", i, turn, lambda: own)
         carrier = turn if joint.kind == "ball" else parent.turn
         axes = [step("axis", i, rotated(carrier, axis), axis.copy) for axis in local]
+        skipped = parent.turn @ backward(parent.own)  # of the joint before that
+        axes = [
+            step("axis before", i, right, partial(rotated, skipped, axis)) for right, axis in zip(axes, local)
+        ]
         spin = np.einsum("ksc,sk->sc", axes, rates)
-        to_parent = backward(parent.turn)
-        passed = parent.passed
-        passed = step("carried back", i, passed, lambda: rotated(turn @ own @ to_parent, parent.passed))
-        passed = step("carried as it is", i, passed, lambda: rotated(turn @ to_parent, passed))
-        alpha = parent.alpha + step("alpha", i, np.cross(passed, spin))
+        back = turn @ own @ backward(parent.turn)
+        passed = step("carried back", i, parent.passed, lambda: rotated(back, parent.passed))
+        passed = step("both back", i, passed, lambda: rotated(back, parent.passed))
+        turning = step("both back", i, parent.alpha, lambda: rotated(back, parent.alpha))
+        convective = step("alpha", i, np.cross(passed, spin))
+        convective = step("minus alpha", i, convective, lambda: -convective)
+        alpha = turning + convective + np.einsum("ksc,sk->sc", axes, forced)
+        moved = self.carried(i, arm, omega, parent.alpha)
+        moved = step("own motion", i, moved, lambda: self.carried(i, arm, omega + spin, alpha))
+        a = step("a", i, parent.a, lambda: rotated(turn @ backward(parent.turn), parent.a))
+        a = moved + step("base", i, a)
         used = step("relative", i, passed + spin, lambda: spin)
-        return Frame(turn, parent.origin + r, axes, used, alpha, a, own, passed + spin)
+        return Frame(turn, own, arm, axes, used, alpha, a, passed + spin)
 
-    def inertia(self, b: int, turn: ndarray) -> ndarray:
-        """The tensor of a body in the world's axes, (rows, 3, 3)."""
-        about_joint = point_inertia(np.array(self.tree.com[b]), self.tree.mass[b])
-        I = self.identity @ np.array(self.tree.inertia[b])
-        I = self.step("about the joint", b, I, lambda: I + about_joint)
-        I = self.step("parallel axis", b, I, lambda: I - about_joint)
-        turned = self.step("not turned", b, turn @ I @ backward(turn), lambda: I)
-        turned = self.step("world axes", b, turned, lambda: turn @ turned @ backward(turn))
-        return self.step("turned back", b, turned, lambda: backward(turn) @ I @ turn)
+    def carried(self, i: int, arm: ndarray, omega: ndarray, alpha: ndarray) -> ndarray:
+        """The acceleration of the end of an arm from that of its beginning."""
+        return np.cross(alpha, arm) + self.step("offset", i, centripetal(omega, arm))
 
-    def segment(self, b: int, right: ndarray, alone: ndarray) -> ndarray:
-        """What the segment from a body's joint to its CoM adds to a velocity or acceleration.
-
-        alone: as if the joint's own turn were all.
-        """
-        name, _, components = self.slip.partition(" of components ")
-        where = ["xyz".index(k) for k in components]
-        if not where:
-            return right
-        wrong = right.copy()
-        of_slip = {"sines": right[:, where[::-1]], "signs": -right[:, where], "angle": alone[:, where]}
-        wrong[:, where] = of_slip[name]
-        return self.step(self.slip, b, right, lambda: wrong)
-
-    def values(self) -> tuple[ndarray, ndarray, ndarray]:
-        """Mbar (rows, nv, nv), velocity terms of h and h at rest (rows, nv)."""
-        tree, nv = self.tree, len(self.tree.axis)
-        velocity_terms, rest = np.zeros((2, self.rows, nv))
-        M = np.zeros((self.rows, nv, nv)) + np.diag(tree.armature if len(tree.armature) else [0.0] * nv)
-        for b, mass in ((b, mass) for b, mass in enumerate(tree.mass) if tree.body_joint[b] >= 0):
-            frame = self.frames[tree.body_joint[b]]
-            I, omega = self.inertia(b, frame.turn), frame.omega
-            moment = rotated(I, frame.alpha) + np.cross(omega, rotated(I, omega))
-            T, B, levers, turns = self.columns(b)
-            velocity_terms += mass * np.einsum("snc,sc->sn", levers, self.acceleration(b))
-            velocity_terms += np.einsum("snc,sc->sn", turns, moment)
-            rest -= mass * levers @ np.array(tree.gravity)
-            M += mass * levers @ backward(T) + turns @ I @ backward(B)
-        return M, velocity_terms, rest
-
-    def acceleration(self, b: int) -> ndarray:
-        """Of the CoM of a body at qdd = 0."""
-        frame, joint = self.frames[self.tree.body_joint[b]], self.joints[self.tree.body_joint[b]]
-        com, speed = self.everywhere(self.tree.com[b]), self.qd[:, [joint.qd.start]]
-        r, spin = rotated(frame.turn, com), self.everywhere(self.tree.axis[joint.qd.start]) * speed
-        a = self.step("CoM outward", b, np.cross(frame.alpha, r))
-        a = a + self.step("centripetal", b, centripetal(frame.omega, r))
-        a = self.segment(b, a, centripetal(spin, rotated(frame.own, com)))
-        return self.step("base of body", b, frame.a + a, lambda: a)
-
-    def columns(self, b: int) -> tuple[ndarray, ndarray, ndarray, ndarray]:
-        """T and B of a body, and the columns by which its force and moment act, (rows, nv, 3) each."""
-        tree, joint, step = self.tree, self.tree.body_joint[b], self.step
-        T, B, levers, turns = np.zeros((4, self.rows, len(tree.axis), 3))
-        frame, com = self.frames[joint], self.everywhere(tree.com[b])
-        r, alone = rotated(frame.turn, com), rotated(frame.own, com)
-        is_outward = self.slip.endswith("outward")
-        is_inward = self.slip.endswith("inward") or self.slip.startswith(("force", "moment"))
-        for i, of_force, of_moment in self.wrenches(b, r) if is_inward or is_outward else self.movers(b):
-            mover, is_own = self.frames[i], float(i == joint)
-            for n, axis in enumerate(mover.axes, self.joints[i].qd.start):
-                local = self.everywhere(tree.axis[n])
-                if mover.slides:
-                    T[:, n] = levers[:, n] = axis
-                    continue
-                arm = self.segment(b, np.cross(axis, r), is_own * np.cross(local, alone))
-                right = np.cross(axis, self.lever(i, frame.origin)) + arm
-                T[:, n] = levers[:, n] = step("column", i * len(tree.mass) + b, right)
-                turning = step("axis in B", i, axis, local.copy)
-                turning = step("column of B", i * len(tree.mass) + b, turning)
-                turning = step("relative B", b, turning, partial(np.multiply, turning, is_own))
-                B[:, n] = turns[:, n] = turning
-                if is_inward or is_outward:  # by virtual power also how the joint accelerates the CoM
-                    (T if is_outward else levers)[:, n] = np.einsum("sij,si->sj", of_force, axis)
-                if is_inward:
-                    turns[:, n] = np.einsum("sij,si->sj", of_moment, axis)
-        return T, B, levers, turns
-
-    def movers(self, b: int) -> Iterator[tuple[int, ndarray, ndarray]]:
-        return ((i, self.identity, self.identity) for i in self.tree.path(self.tree.body_joint[b]))
-
-    def lever(self, i: int, x: ndarray) -> ndarray:
-        """From the origin of joint i to a point."""
-        lever = self.step("lever", i, x - self.frames[i].origin, lambda: x)
-        lever = self.step("lever from the first", i, lever, lambda: x - self.frames[0].origin)
-        return self.step("lever from the joint before", i, lever, lambda: x - self.before(i).origin)
-
-    def wrenches(self, b: int, r: ndarray) -> Iterator[tuple[int, ndarray, ndarray]]:
-        """The joints that move a body, inward; its force and moment as moments there, (rows, 3, 3)."""
-        step, joint, force, of_moment = self.step, self.tree.body_joint[b], self.identity, self.identity
-        arm = step("CoM outward", b, step("CoM inward", b, r))
-        of_force = crossing(step("sign inward", b, arm, lambda: -r))
-        what, _, how = self.slip.partition(" ")
-        while joint >= 0:
-            yield joint, of_force, of_moment
-            parent, frame, turned = self.before(joint), self.frames[joint], self.identity
-            if what in ("force", "moment"):
-                own = backward(frame.own) if how == "turned back" else self.identity
-                wrong = partial(np.matmul, parent.turn @ own, backward(frame.turn))
-                turned = step(self.slip, joint, self.identity, wrong)
-            if what == "force":
-                force, turned = turned @ force, self.identity
-            lever = step("offset inward", joint, frame.origin - parent.origin)
-            lever = step("offset outward", joint, lever)
-            joint_before = self.tree.parent[joint]
-            lever = step("CoM for offset inward", joint, lever, partial(self.com_of, joint_before))
-            of_force, of_moment = turned @ of_force + crossing(lever) @ force, turned @ of_moment
-            joint = joint_before
+    def wrench(self, b: int) -> tuple[ndarray, ndarray]:
+        """The force of a body, and its moment about the origin of its joint."""
+        step, tree, joint = self.step, self.tree, self.tree.body_joint[b]
+        frame, first, mass, I = self.frames[joint], self.frames[0], tree.mass[b], np.array(tree.inertia[b])
+        com = np.broadcast_to(np.array(tree.com[b]), (self.rows, 3))
+        c = step("com", b, rotated(frame.turn, com), lambda: com)
+        c = step("com before", b, c, lambda: rotated(frame.turn @ backward(frame.own), com))
+        I, omega, alpha = frame.turn @ I @ backward(frame.turn), frame.omega, frame.alpha
+        following = [k for k, parent in enumerate(tree.parent) if parent == joint]
+        arm = step("offset for CoM", b, c, lambda: self.frames[following[0]].arm if following else c)
+        swung = step("centripetal", b, centripetal(omega, arm))
+        F = mass * (frame.a + np.cross(alpha, arm) + swung)
+        spun = rotated(I, omega)
+        gyroscopic = np.cross(omega, spun)
+        of_first = rotated(frame.turn @ backward(first.turn), first.omega)
+        gyroscopic = step("first omega", b, gyroscopic, lambda: np.cross(omega, rotated(I, of_first)))
+        gyroscopic = step("alpha for omega", b, gyroscopic, lambda: np.cross(omega, rotated(I, alpha)))
+        own_axes = frame.turn @ backward(self.before(joint).turn)
+        lever = step("lever", b, c, lambda: rotated(own_axes, frame.arm))
+        moment = step("CoM", b, np.cross(lever, F))
+        moment = step("minus CoM", b, moment, lambda: -moment)
+        return F, rotated(I, alpha) + gyroscopic + moment
 
     def com_of(self, joint: int) -> ndarray:
         """From a joint to the CoM of its body."""
         coms = (com for com, at in zip(self.tree.com, self.tree.body_joint) if at == joint)
-        turn = self.frames[joint].turn if joint >= 0 else self.identity
-        return rotated(turn, self.everywhere(next(coms, (0.0, 0.0, 0.0))))
+        com = np.array(next(coms, (0.0, 0.0, 0.0)))
+        return rotated(self.frames[joint].turn, np.broadcast_to(com, (self.rows, 3)))
+
+    def forces(self) -> ndarray:
+        """Of the joints, (rows, nv), inward."""
+        step, tree, tau = self.step, self.tree, np.zeros(self.qd.shape)
+        F, N = np.zeros((2, len(tree.parent), self.rows, 3))
+        for b, joint in enumerate(tree.body_joint):
+            if joint >= 0:
+                force, moment = self.wrench(b)
+                F[joint] += force
+                N[joint] += moment
+        for i in range(len(tree.parent))[::-1]:
+            frame, parent, joint = self.frames[i], self.before(i), tree.parent[i]
+            acting = F[i] if frame.slides else N[i]
+            following = next((k for k, before in enumerate(tree.parent) if before == i), i)
+            for n, axis in enumerate(frame.axes, self.joints[i].qd.start):
+                along = step("next axis", i, axis, self.frames[following].axes[0].copy)
+                tau[:, n] = np.einsum("sc,sc->s", along, acting)
+            if joint < 0:
+                continue
+            to_parent = parent.turn @ backward(frame.turn)
+            force = step("force", i, F[i], partial(rotated, to_parent, F[i]))
+            turned = parent.turn @ backward(frame.own) @ backward(frame.turn)
+            force = step("force turned back", i, force, partial(rotated, turned, F[i]))
+            lever = np.cross(step("com for offset", i, frame.arm, partial(self.com_of, joint)), force)
+            lever = step("moment", i, lever)
+            F[joint] += force
+            N[joint] += step("n", i, N[i]) + step("minus moment", i, lever, partial(np.negative, lever))
+        return tau + np.array(tree.armature or [0.0] * len(tree.axis)) * self.qdd
 
 
-def slips_of_recursion(equations: Equations) -> Iterator[Variant]:
-    """The values with each slip at each joint or body, at those that are alike, and at all of them."""
-    tree, count = equations.tree, len(equations.q)
-    places = places_of_slips(tree)
-    computed: dict[str, ndarray] = {}
+def slips_of_recursion(equations: Equations) -> Iterator[Hypothesis]:
+    """The values with each slip at each joint or body, and at all of them."""
+    tree = equations.tree
+    places = {"joint": sets_of_joints(tree), "body": sets_of_bodies(tree)}
     for record in SLIPS:
         those = places[record.at]
-        if those and record.step not in computed:
-            at = np.zeros((1 + max(map(max, those.values())), len(those) * count), bool)
-            for k, numbers in enumerate(those.values()):
-                at[numbers, k * count : (k + 1) * count] = True
-            q, qd = (np.tile(part, (len(those), 1)) for part in (equations.q, equations.qd))
-            values = equations.layout.packed(*Recursion(tree, q, qd, record.step, at).values())
-            computed[record.step] = values.reshape(len(those), count, -1)
-        for k, place in enumerate(those):
-            yield slip(record.name.format(place), "no", "", computed[record.step][k])
+        at = np.zeros((1 + max(map(max, those.values())), len(those)), bool)
+        for k, numbers in enumerate(those.values()):
+            at[numbers, k] = True
+        values = evaluated(equations, record.step, at)
+        for (name, numbers), of_place in zip(those.items(), values):
+            yield slip(record.place, "", record.wrong, of_place, name, len(numbers))
 
 
-def places_of_slips(tree: tmt.Tree) -> dict[str, dict[str, list[int]]]:
-    """Where a slip can be made, by the words of `Slip.at`."""
-    names = tree.joint_names
-    turned = [i for i, kind in enumerate(tree.kind) if kind != "slide"] if len(names) <= MOST_SPEEDS else []
-    moving = [(i, b) for b in range(len(tree.mass)) for i in turned if tree.moves(b)[i]]
-    columns = {f"{names[i]} for {tree.body_names[b]}": [i * len(tree.mass) + b] for i, b in moving}
-    return {"joint": sets_of_joints(tree), "body": sets_of_bodies(tree), "joint and body": columns}
+def evaluated(equations: Equations, slip: str, at: ndarray) -> ndarray:
+    """The values with a slip at the joints or bodies of each column of `at`, (columns, states, entries)."""
+    (states, nv), columns = equations.qd.shape, at.shape[1]
+    zero, unit = np.zeros((states, nv)), np.broadcast_to(np.eye(nv)[:, None], (nv, states, nv))
+    qd = np.concatenate([[equations.qd, zero], np.zeros_like(unit)])  # (2 + nv, states, nv)
+    qdd, g = np.concatenate([[zero, zero], unit]), np.zeros((2 + nv, states, 3))
+    g[1] = equations.tree.gravity
+    rows = np.tile(at[:, :, None], (1, 1, (2 + nv) * states)).reshape(len(at), -1)
+    q = np.tile(equations.q, (columns * (2 + nv), 1))
+    qd, qdd, g = (np.tile(part.reshape(-1, part.shape[2]), (columns, 1)) for part in (qd, qdd, g))
+    forces = Recursion(equations.tree, q, qd, qdd, g, slip, rows).forces()
+    forces = forces.reshape(columns, 2 + nv, states, nv)
+    M = np.moveaxis(forces[:, 2:], 1, 3)  # (columns, states, row, unit)
+    return equations.layout.packed(M, forces[:, 0], forces[:, 1])

@@ -4,7 +4,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import chain
 from math import inf
 
 import numpy as np
@@ -19,27 +18,40 @@ from .conventions import Convention, all_conventions, values_in
 from .edits import edits
 from .fit import PROMISING, Fitted, OutOfTime, Search
 from .given import Bias, Given
-from .groups import loads, several, turned
-from .likelihood import NATURAL, cost
-from .model import Values
+from .groups import inertial_numbers, several, vectors
+from .hypothesis import Hypothesis
+from .kinematics import slips_of_kinematics
+from .likelihood import NATURAL, cost, in_part
+from .model import Equations, Values
 from .places import OF_ZERO
 from .recursion import slips_of_recursion
 from .statements import Stated, Statements
 from .terms import all_places
-from .variants import Variant, exchanged_entries, lagrange, other_angles, other_variables, program_options
+from .variants import lagrange, linearized, orders_of_rotation, other_angles, program_options, sums_of_angles
 
 FEW = 2  # states at which conventions are tried first
-NEAREST = 0.5  # of the difference: what leaves more is not near
+TRIED = 3  # states at which other explanations are tried first
+NEAREST = 0.05  # of the difference: what leaves more is not near
 NEAR = 2  # conventions with which another cause is sought
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 # pairs of a slip and a number that are tried: by what they leave to first order
 SECOND_ORDER, MOST_NEAR = 0.1, 200
-WITHOUT = "velocity terms in h", "bias"  # left out: nothing else can be wrong there
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
-    ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in gravity alone",
-    ("M", "velocity terms"): ", but not in gravity", ("M", "gravity"): ", but not in the velocity terms of h",
+    ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in {rest} alone",
+    ("M", "velocity terms"): ", but not in {rest}", ("M", "gravity"): ", but not in the velocity terms of h",
 }  # fmt: skip
+
+
+Kind = Callable[[Equations], Iterator[Hypothesis]]
+SLIPS: tuple[Kind, ...] = (
+    orders_of_rotation,
+    slips_of_kinematics,
+    slips_of_recursion,
+    linearized,
+    sums_of_angles,
+)
+ALL_KINDS: tuple[Kind, ...] = (program_options, edits, lagrange, *SLIPS)
 
 
 def diagnose(
@@ -54,11 +66,11 @@ def diagnose(
     """
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
         given = Given(tree, values, bias, mass_matrix, qdd=qdd)
-        return Explanations(given, time.process_time() + seconds, stated, seconds).diagnosis()
+        return Explanations(given, time.monotonic() + seconds, stated, seconds).diagnosis()
 
 
 class Explanations:
-    """What explains given values. end: the time.process_time() at which the search ends."""
+    """What explains given values. end: the time.monotonic() at which the search ends."""
 
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
         self.given, self.equations, self.seconds, self.end = given, given.equations, seconds, end
@@ -72,6 +84,7 @@ class Explanations:
         self.known = [name for name, part in parts.items() if known[part].any()]
         self.differing = [name for name, part in parts.items() if self.off[part].any()]
         self.is_finished = True
+        self.computed: dict[tuple[Kind, bool], list[Hypothesis]] = {}
 
     def diagnosis(self) -> Diagnosis:
         if not self.off.any():
@@ -81,21 +94,30 @@ class Explanations:
         places = [[k] for k in range(layout.in_M.stop)] + [layout.of_row(i) for i in range(layout.nv)]
         found = Diagnosis(
             True, entries=tuple(name for name, at in zip(names, places) if self.off[at].any()),
-            compared=sum(known[at].any() for at in places), parts=tuple(self.differing),
-            known=tuple(self.known), is_symmetric=layout.is_symmetric,
+            compared=sum(known[at].any() for at in places), parts=self.named(self.differing),
+            known=self.named(self.known), is_symmetric=layout.is_symmetric, is_of_forces=layout.qdd is not None,
         )  # fmt: skip
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
         if causes:
             return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))))
-        near = [fit for fit in self.all_singles if fit.is_possible and fit.left_over < NEAREST]
+        whole = [fit for fit in self.all_singles if fit.is_possible and fit.left_over < NEAREST]
+        near = [fit for fit in whole if fit.places[0].kind != "whole"]
         closest = min(near, key=lambda fit: fit.left_over, default=None)
         return found._replace(
             closest=closest.cause if closest else None,
             details=self.given.details() if layout.qdd is None else (),
             seconds=None if self.is_finished else self.seconds,
         )
+
+    @property
+    def at_rest(self) -> str:
+        """The part of h at rest: a robot with springs has them in the forces that are compared."""
+        return "the forces at rest" if self.equations.tree.has_springs else "gravity"
+
+    def named(self, parts: Sequence[str]) -> tuple[str, ...]:
+        return tuple(self.at_rest if part == "gravity" else part for part in parts)
 
     def cost(self, cause: Cause) -> float:
         return cost(cause, self.equations)
@@ -115,7 +137,7 @@ class Explanations:
             except OutOfTime:
                 self.is_finished = False
             yield [cause for cause in causes if self.cost(cause) < NATURAL]
-            unusual += causes
+            unusual += (cause for cause in causes if cause.kind != "whole")
             if stage == self.groups:
                 yield [cause for cause in unusual if cause.kind in ("number", OF_ZERO)]
             if not self.is_finished:
@@ -124,25 +146,35 @@ class Explanations:
 
     def everything(self) -> Iterator[Cause]:
         """Options, conventions, single numbers and terms, and edits of several numbers."""
-        yield from self.search.explained(self.options)
+        yield from self.search.explained(self.variants(program_options))
         for convention, values in self.in_conventions(self.search):
             for cause in self.search.explained([(convention.cause, values)]):
                 yield from self.statements.restated(cause, convention.joints)
         yield from self.statements.causes(fit for fit in self.all_singles if fit.explains)
-        yield from self.search.explained(self.variants)
+        yield from self.explained(self.search, (edits, lagrange))
 
     def slips(self) -> list[Cause]:
-        """Slips of a recursion."""
-        return self.search.explained(self.recursions)
+        """Slips of positions, angular velocities and tensors, and of a recursion."""
+        return [cause for kind in SLIPS for cause in self.explained(self.search, (kind,))]
+
+    def explained(self, search: Search, kinds: Iterable[Kind]) -> list[Cause]:
+        """The causes of some kinds that leave nothing of what is searched: at a few states, then at all."""
+        causes: list[Cause] = []
+        few = search.at(self.tried)
+        for kind in kinds:
+            if near := {key_of(cause) for cause in few.explained(self.variants_at_few(kind))}:
+                causes += search.explained(pair for pair in self.variants(kind) if pair.key in near)
+        return causes
 
     def angles(self) -> list[Cause]:
         """Sines and cosines of a hinge, in an entry or a part."""
         return self.search.explained(other_angles(self.equations, self.search))
 
     def groups(self) -> Iterator[Cause]:
-        """Loads, and tensors about other axes."""
-        yield from loads(self.equations, self.search)
-        yield from turned(self.equations, self.search)
+        """The ten numbers of a body, the same number of all, the components of an offset or a CoM."""
+        yield from inertial_numbers(self.equations, self.search)
+        yield from several(self.search)
+        yield from vectors(self.search)
 
     def of_parts(self) -> list[Cause]:
         """Slips in some parts alone, in all that differ."""
@@ -151,14 +183,6 @@ class Explanations:
         if different != self.known:
             causes += self.within(different, self.differing)
         return causes
-
-    def of_each_part(self) -> Iterator[Cause]:
-        """One cause for some parts, and one for the others."""
-        different = self.independent(self.differing)
-        for part in different if len(different) > 2 else different[:-1]:
-            one, others = self.within([part], [part]), [name for name in different if name != part]
-            if one and (two := self.within(others, others)):
-                yield together([one[0], two[0]], 0.0)
 
     def independent(self, parts: Sequence[str]) -> list[str]:
         """The parts without velocity terms that follow from a given Mbar that differs."""
@@ -184,12 +208,18 @@ class Explanations:
 
         def add(found: list[Cause], moved: ndarray) -> None:
             is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
-            where = IN_PARTS.get(tuple(said), "") if is_elsewhere else ""
-            causes.extend(replace(cause, place=cause.place + where) for cause in found)
+            where = IN_PARTS.get(tuple(said), "").format(rest=self.at_rest) if is_elsewhere else ""
+            for cause in found:
+                more = in_part(cause) if where else 0.0
+                causes.append(replace(cause, place=cause.place + where, cost=cause.cost + more))
 
-        angles = other_angles(self.equations, search)
-        for variant in chain(self.all_variants, angles):
-            add(search.explained([variant]), variant[1] - search.right)
+        few = search.at(self.tried)
+        for kind in ALL_KINDS:
+            if near := {key_of(cause) for cause in few.explained(self.variants_at_few(kind))}:
+                for pair in (pair for pair in self.variants(kind) if pair.key in near):
+                    add(search.explained([pair]), pair[1] - search.right)
+        for pair in other_angles(self.equations, search):
+            add(search.explained([pair]), pair[1] - search.right)
         for convention, values in self.in_conventions(search):
             add(search.explained([(convention.cause, values)]), values - search.right)
         for fit in (fit for fit in search.singles(is_thorough=False) if fit.explains):
@@ -202,7 +232,7 @@ class Explanations:
             inner = Explanations(self.given.in_the_model(convention), self.end, None)
             if not inner.off.any():
                 continue
-            causes = inner.search.explained(chain(inner.options, inner.variants))
+            causes = inner.explained(inner.search, (program_options, edits, lagrange))
             causes += [fit.cause for fit in inner.search.singles(is_thorough=False) if fit.explains]
             for cause in (cause for cause in causes if inner.cost(cause) < NATURAL):
                 both = together([convention.cause, cause], 0.0)
@@ -210,51 +240,63 @@ class Explanations:
 
     def two_causes(self) -> Iterator[Cause]:
         yield from self.beside_conventions()
-        yield from several(self.search)
         fits = self.search.pairs(("number", OF_ZERO), ("number", OF_ZERO, "term", "coefficient"))
         yield from self.statements.causes(fit for fit in fits if fit.explains)
-        yield from self.of_each_part()
         yield from self.with_slips()
+        if not any(fit.explains for fit in fits):
+            numbers = [fit for fit in fits if all(place.kind == "number" for place in fit.places)]
+            yield from self.statements.causes(fit for fit in self.search.thirds(numbers) if fit.explains)
 
     def with_slips(self) -> Iterator[Cause]:
-        """An edit or a slip beside a number, a term or another slip; their changes are added."""
-        variants, search = self.all_variants, self.search
-        moved = np.stack([((values - search.right) * search.weight).ravel() for _, values in variants])
+        """An edit or a slip beside a number or a term; their changes are added."""
+        search = self.search.at(self.tried)
+        variants = [(kind, *pair) for kind in ALL_KINDS for pair in self.variants_at_few(kind)]
+        moved = np.stack([((values - search.right) * search.weight).ravel() for *_, values in variants])
         left = search.off.ravel() - moved
         squares, enough = np.einsum("vm,vm->v", left, left), (PROMISING * search.size) ** 2
         columns = search.expansion[0].reshape(len(search.places), -1)
         lengths = np.linalg.norm(columns, axis=1)
         along = left @ (columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]).T
-        after = squares[:, None] - along**2
+        acts = np.abs(moved).max(axis=1) > 1.0
+        may = np.array([place.kind != "whole" for place in search.places])
+        after = np.where(acts[:, None] & may, squares[:, None] - along**2, np.inf)
         near = np.argwhere(after < enough + SECOND_ORDER * squares[:, None])
         for v, k in near[np.argsort(after[tuple(near.T)])][:MOST_NEAR].tolist():
-            ratio, change = search.best_change(k, left[v].reshape(search.off.shape))
+            if search.best_change(k, left[v].reshape(search.off.shape))[0] > 1.0:
+                continue
+            kind, cause, _ = variants[v]
+            values = next(values for other, values in self.variants(kind) if key_of(other) == key_of(cause))
+            ratio, change = self.search.best_change(k, self.search.weighted(values))
             if ratio <= 1.0 and search.places[k].is_possible(change):
-                yield together([variants[v][0], search.places[k].cause(change)], 0.0)
-        both = squares[:, None] + np.einsum("vm,vm->v", moved, moved) - 2.0 * left @ moved.T
-        for v, w in np.argwhere(np.triu(both < enough)).tolist()[:MOST_NEAR]:
-            pair = variants[v][0], variants[w][0]
-            if np.abs(left[v] - moved[w]).max() <= 1.0 and not any(cause.place in WITHOUT for cause in pair):
-                yield together(pair, 0.0)
+                yield together([cause, search.places[k].cause(change)], 0.0)
 
     # what is computed once
 
     @cached_property
-    def options(self) -> list[Variant]:
-        return list(program_options(self.equations))
+    def tried(self) -> ndarray:
+        """The states at which explanations are tried first: where most is given."""
+        return np.sort(np.argsort(-self.search.known.sum(axis=1), kind="stable")[:TRIED])
 
-    @cached_property
-    def variants(self) -> list[Variant]:
-        kinds = edits, lagrange, exchanged_entries, other_variables
-        return [*chain.from_iterable(kind(self.equations) for kind in kinds)]
+    def variants(self, kind: Kind) -> list[Hypothesis]:
+        """The explanations of a kind, computed once."""
+        if (kind, False) not in self.computed:
+            self.computed[kind, False] = self.all_of(kind, self.equations)
+        return self.computed[kind, False]
 
-    @cached_property
-    def recursions(self) -> list[Variant]:
-        return list(slips_of_recursion(self.equations))
+    def all_of(self, kind: Kind, equations: Equations) -> list[Hypothesis]:
+        """The explanations of a kind, as far as there is time; options are always tried."""
+        found = []
+        for pair in kind(equations):
+            found.append(pair)
+            if kind is not program_options:
+                self.search.in_time()
+        return found
 
-    @property
-    def all_variants(self) -> list[Variant]:
-        return [*self.options, *self.variants, *self.recursions]
+    def variants_at_few(self, kind: Kind) -> list[Hypothesis]:
+        """The same at a few states."""
+        if (kind, True) not in self.computed:
+            self.computed[kind, True] = self.all_of(kind, self.equations.at(self.tried))
+        return self.computed[kind, True]
 
     @cached_property
     def all_singles(self) -> list[Fitted]:
@@ -296,18 +338,23 @@ class Explanations:
         return follows_from(given.mass_matrix, values.q, values.qd, values.bias - given.rest)
 
 
+def key_of(cause: Cause) -> tuple[str, str]:
+    """What tells the explanations of a kind apart."""
+    return cause.place, str(cause.explains)
+
+
 def distinct(causes: Iterable[Cause]) -> list[Cause]:
-    """Each cause once; none of every body or joint where one of them suffices."""
+    """Each cause once; none of every body or joint where one of them suffices, no part of a term where a number does."""
     once: dict[frozenset[tuple[str, str]], Cause] = {}
     for cause in causes:
         parts = cause.parts if len(cause.parts) > 1 else (cause,)
         once.setdefault(frozenset((part.place, str(part.explains)) for part in parts), cause)
-    return [cause for cause in once.values() if not any(is_of_one(other, cause) for other in once.values())]
-
-
-def is_of_one(cause: Cause, of_all: Cause) -> bool:
-    """Whether a cause is for one body or joint what another is for every one."""
-    before, every, after = of_all.place.partition("every ")
-    if not every or "every " in cause.place or (cause.kind, cause.explains) != (of_all.kind, of_all.explains):
-        return False
-    return cause.place.startswith(before) and cause.place.endswith(after.partition(" ")[2])
+    kinds, fewest = {cause.kind for cause in once.values()}, dict[tuple[str, str], int]()
+    for cause in once.values():
+        key = cause.form, str(cause.explains)
+        fewest[key] = min(cause.owners, fewest.get(key, cause.owners))
+    return [
+        cause for cause in once.values()
+        if not (cause.form and cause.owners > fewest[cause.form, str(cause.explains)])
+        and not (cause.kind == "part" and kinds & {"number", "body"})
+    ]  # fmt: skip

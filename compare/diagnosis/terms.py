@@ -1,4 +1,4 @@
-"""Places that are a factor: of terms and their parts, of entries and coefficients; all places of a search."""
+"""Places that are a factor: of terms, of entries and coefficients; all places of a search."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, combinations_with_replacement
@@ -7,20 +7,20 @@ import numpy as np
 
 import tmt
 
-from .model import MOST_SPEEDS, OF_TERM, Entry, Equations, Path
-from .places import ALL, FIT_ROUNDING, Place, factor, forces, numbers, sets_of_bodies, tied
+from .kinematics import parts_of_translation
+from .model import MOST_SPEEDS, OF_TERM, Entry, Equations
+from .places import ALL, FIT_ROUNDING, Place, factor, forces, numbers, sets_of_bodies
 
 TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
     "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
-MOST_JOINTS = 4  # of whose parts of terms single entries of Mbar are tried
 
 
 def all_places(equations: Equations) -> list[Place]:
     """The places that have an influence at some state, as far as that is known beforehand."""
-    kinds = numbers, tied, masses_in_rows, terms, coefficients, forces_in_bias, parts_of_terms
+    kinds = numbers, terms, parts_of_translation, coefficients, forces_in_bias
     places = chain.from_iterable(places_of(equations) for places_of in kinds)
     return [place for place in places if place.column is None or place.column.any()]
 
@@ -97,22 +97,6 @@ def forces_in_bias(equations: Equations) -> Iterator[Place]:
             yield place._replace(kind="force", name=f"{place.name} in h", stated=0.0, column=column)
 
 
-def masses_in_rows(equations: Equations) -> Iterator[Place]:
-    """The mass of a body in the rows and columns of the hinges alone, or of the slides."""
-    tree, layout, terms = equations.tree, equations.layout, equations.terms
-    of_slides = [joint.qd.start for joint in tree.coordinates.joints if joint.kind == "slide"]
-    rows = {"hinges": [v for v in range(equations.nv) if v not in of_slides], "slides": of_slides}
-    added = terms["translation"] + terms["gravity"] + terms["convective"]
-    for name, those in rows.items() if all(rows.values()) else ():
-        entries = [k for k, (i, j) in enumerate(zip(*layout.places)) if i in those and j in those]
-        entries += in_rows(equations, those)
-        for body, mass, of_body in zip(tree.body_names, tree.mass, added):
-            if mass:
-                column = factor("number", "", of_body / mass, entries).column
-                place = f"mass of {body} in the rows of the {name}"
-                yield Place("number", place, mass, "kg", mass, column=column, least=0.0)
-
-
 def terms(equations: Equations) -> Iterator[Place]:
     """Factors of terms of each body, and of several together: in all, in an entry of Mbar, a row of h."""
     bodies, is_small = sets_of_bodies(equations.tree), equations.nv <= MOST_SPEEDS
@@ -121,80 +105,11 @@ def terms(equations: Equations) -> Iterator[Place]:
         added = np.sum([equations.terms[term] for term in together], axis=0)
         for body, those in bodies.items():
             column = added[those].sum(axis=0)
-            yield factor("term", name.format(body), column)
+            yield factor("term", name.format(body), column, form=name, owners=len(those))
             if is_small and len(together) == len(those) == 1:
                 for where, entries in (entries_of_M(equations) | of_rows).items():
                     if len(entries) == 1 or where in of_rows:
                         yield factor("term", f"{name.format(body)} in {where}", column, entries)
-
-
-def parts_of_terms(equations: Equations) -> Iterator[Place]:
-    """The factor of each part of a term of a body, in all and, for few joints, in an entry of Mbar.
-
-    T is a sum over the lengths that carry the body and its CoM, T' m T over pairs of these lengths.
-    """
-    if equations.nv > MOST_SPEEDS:
-        return
-    entries = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]]
-    for name, column in parts_of_bodies(equations).items():
-        active = np.abs(column).max(axis=0) > FIT_ROUNDING * np.abs(column).max()
-        for k in np.flatnonzero(active[equations.in_M]).tolist() if equations.nv <= MOST_JOINTS else ():
-            yield factor("part", f"{name} in {entries[k]}", column, [k])
-        yield factor("part", name, column)
-
-
-def lengths_of(tree: tmt.Tree, b: int) -> dict[str, list[tuple[str, int]]]:
-    """What carries the CoM of a body: numbers of the tree by names; slides that follow each other are one."""
-    lengths: dict[str, list[tuple[str, int]]] = {}
-    slides: list[int] = []
-    for i in (i for i in range(len(tree.parent)) if tree.moves(b)[i]):
-        name = tree.joint_names[i]
-        if tree.parent[i] >= 0 and np.any(tree.offset[i]):
-            lengths[f"offset of {name}"] = [("offset", i)]
-        if tree.kind[i] == "slide":
-            together = bool(slides) and tree.parent[i] == slides[-1]
-            before = lengths.pop(", ".join(tree.joint_names[k] for k in slides), []) if together else []
-            slides = [*slides, i] if together else [i]
-            called = ", ".join(tree.joint_names[k] for k in slides)
-            lengths[called] = [*before, ("axis", tree.coordinates.joints[i].qd.start)]
-    return lengths | {f"CoM of {tree.body_names[b]}": [("com", b)]}
-
-
-def parts_of_bodies(equations: Equations) -> dict[str, np.ndarray]:
-    """What pairs of lengths of a body add to Mbar and h, (states, entries); for a slide, its gravity too."""
-    tree, parts = equations.tree, {}
-    present: dict[tuple[int, str, str], list[tuple[str, int]]] = {}
-    slides: set[str] = set()
-    for b in range(len(tree.mass)):
-        lengths = lengths_of(tree, b)
-        slides |= {name for name, numbers in lengths.items() if numbers[0][0] == "axis"}
-        for first, second in combinations_with_replacement(lengths, 2):
-            present[b, first, second] = [("mass", b), *lengths[first], *lengths[second]]
-        present |= {(b, "gravity", name): [("mass", b), ("gravity", 0), *of] for name, of in lengths.items()}
-    values = dict(zip(present, alone(equations, list(present.values()))))
-    for (b, first, second), column in values.items():
-        if first == "gravity":
-            continue
-        name = f"mass of {tree.body_names[b]} * ({first})^2"
-        if first != second:
-            name = f"mass of {tree.body_names[b]} * {first} * {second}"
-            column = column - values[b, first, first] - values[b, second, second]
-            if first in slides:  # the first moment
-                column = column + values[b, "gravity", second] - values[b, second, second]
-        parts[name] = column
-    return {name: column for name, column in parts.items() if column.any()}
-
-
-def alone(equations: Equations, sets: list[list[tuple[str, int]]]) -> np.ndarray:
-    """Mbar and h if all masses, tensors and lengths are zero except sets of them, (sets, states, entries)."""
-    changes: dict[Path, np.ndarray] = {}
-    of_slides = {joint.qd.start for joint in equations.tree.coordinates.joints if joint.kind == "slide"}
-    for field in ("mass", "inertia", "offset", "com", "gravity", "armature", "axis"):
-        for at, x in np.ndenumerate(equations.stated[field]):
-            number = (field, 0 if field == "gravity" else at[0])
-            if x and (field != "axis" or at[0] in of_slides):
-                changes[Path(field, at)] = np.array([0.0 if number in present else -x for present in sets])
-    return equations.values(changes)
 
 
 def coefficients(equations: Equations) -> Iterator[Place]:
@@ -204,7 +119,7 @@ def coefficients(equations: Equations) -> Iterator[Place]:
         yield factor("coefficient", name, right, entries)
     parts = {"M": equations.in_M, "h": equations.in_h, "M and h": ALL} if layout.qdd is None else {}
     for name, part in parts.items():
-        yield factor("coefficient", f"all of {name}", right, part)
+        yield factor("whole", f"all of {name}", right, part)
     of_h = {"": (velocity_terms, rest), "velocity terms of ": (velocity_terms, 0.0 * rest)}
     of_h |= {"gravity of ": (0.0 * rest, rest)}
     for name, rows in rows_of_h(equations).items():

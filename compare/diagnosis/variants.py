@@ -1,23 +1,22 @@
-"""Explanations without a number to fit: options, slips of derivatives, and sines and cosines of a hinge.
+"""Explanations without a number to fit: options, slips of derivatives, other sines and cosines of hinges.
 
 A variant is a cause with Mbar and h as they would be, as `Equations.values` has them.
 """
 
 from collections.abc import Iterable, Iterator
-from functools import partial
-from itertools import chain, combinations, permutations, product
+from dataclasses import replace
+from itertools import combinations, permutations, product
 
 import numpy as np
 
 from tmt import literal
 
-from ..core.cause import Cause
 from ..core.words import listed
 from .fit import Search
-from .model import MOST_SPEEDS, TINY, Equations, Path
+from .hypothesis import Hypothesis, hypothesis, option, slip
+from .model import TINY, Equations, Layout, Path
 from .terms import unit_columns
 
-Variant = tuple[Cause, np.ndarray]  # the values: (states, entries)
 Functions = tuple[
     dict[str, np.ndarray], list[tuple[str, str]]
 ]  # functions by their names, (states,), and pairs
@@ -31,20 +30,14 @@ OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, an
     ("Mdot qd in h", "halved, and no gradient of the kinetic energy"): (0.5, 0.0),
     ("C(q, qd) in h", "transposed, C' qd for C qd"): (0.0, -1.0),
 }  # fmt: skip
-OF_FACTORS = "coefficient", "term", "part"  # kinds of places
+OF_FACTORS = "coefficient", "term"  # kinds of places
+OF_ROTATION = "rotation", "Euler", "gyroscopic"  # terms
 MOST_HINGES = 4  # of which products of sines and cosines are tried
 CLOSE = 1e-6  # of a coefficient, before the values are compared
 OF_SLOPES = {"left out": 0.0, "of the other sign": -1.0, "halved": 0.5, "twice": 2.0}
 
 
-def variant(rank: int, kind: str, place: str, stated: str, explains: str, values: np.ndarray) -> Variant:
-    return Cause(rank=rank, kind=kind, place=place, stated=stated, explains=explains), values
-
-
-option, slip = partial(variant, 1, "option"), partial(variant, 2, "slip")
-
-
-def program_options(equations: Equations) -> Iterator[Variant]:
+def program_options(equations: Equations) -> Iterator[Hypothesis]:
     """What an option or a convention of the whole file or program changes."""
     tree, q, qd, (M, moving, rest) = equations.tree, equations.q, equations.qd, equations.parts
     drag = np.array(tree.damping) * qd
@@ -79,33 +72,6 @@ def program_options(equations: Equations) -> Iterator[Variant]:
         yield option("armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])
 
 
-def exchanged_entries(equations: Equations) -> Iterator[Variant]:
-    """Two entries of Mbar or two rows of h exchanged."""
-    entries, layout = equations.entries, equations.layout
-    of_M = [(entry, [k]) for k, entry in enumerate(entries[equations.in_M])]
-    of_h = [(entries[layout.in_M.stop + i], layout.of_row(i)) for i in range(equations.nv)]
-    pairs = chain(combinations(of_M, 2), combinations(of_h, 2)) if equations.nv <= MOST_SPEEDS else ()
-    for (first, here), (second, there) in pairs:
-        values = equations.right.copy()
-        values[:, [*here, *there]] = values[:, [*there, *here]]
-        names = [entry.named(equations.speeds) for entry in (first, second)]
-        yield variant(2, "numbers", listed(names), "", "exchanged", values)
-
-
-def other_variables(equations: Equations) -> Iterator[Variant]:
-    """The position, the speed or both of a joint taken for those of another of its kind."""
-    tree, q, qd, layout = equations.tree, equations.q, equations.qd, equations.layout
-    straight = [(name, joint) for name, joint in equations.joints.items() if joint.kind != "ball"]
-    for (name, joint), (other, by) in permutations(straight, 2) if len(straight) <= MOST_SPEEDS else ():
-        if joint.kind != by.kind:
-            continue
-        moved, faster = q.copy(), qd.copy()
-        moved[:, joint.q], faster[:, joint.qd] = q[:, by.q], qd[:, by.qd]
-        for what, state in {"q": (moved, qd), "qd": (q, faster), "q and qd": (moved, faster)}.items():
-            values = Equations(tree, *state, layout).right
-            yield slip(f"{what} of {other} taken for that of {name}", "", "", values)
-
-
 def exchanged(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return qd, q
 
@@ -115,7 +81,7 @@ def in_turn(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return together[:, ::2], together[:, 1::2]
 
 
-def lagrange(equations: Equations) -> Iterator[Variant]:
+def lagrange(equations: Equations) -> Iterator[Hypothesis]:
     """Slips in h = Mdot qd - d(kinetic energy)/dq + dV/dq, of hinges and slides."""
     if "ball" in equations.tree.kind:
         return
@@ -128,28 +94,120 @@ def lagrange(equations: Equations) -> Iterator[Variant]:
         values = equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient, rest)
         yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, values)
     speeds = equations.speeds
-    for (i, j), k in ((pair, k) for pair in zip(*np.tril_indices(equations.nv)) for k in range(equations.nv)):
+    for i, (explains, factor) in product(range(equations.nv), OF_SLOPES.items()):
+        added = np.zeros_like(gradient)
+        added[:, i] = (1.0 - factor) * gradient[:, i]
+        if equations.nv > 1 and added.any():
+            place = f"gradient of the kinetic energy in h[{speeds[i]}]"
+            yield slip(place, "once", explains, equations.with_bias(velocity_terms + added, rest))
+    entries = [(i, j) for i in range(equations.nv) for j in range(i + 1)]
+    for (i, j), k in product(entries, range(equations.nv)):
         alone = np.zeros_like(slopes)
         alone[:, [i, j], [j, i], k] = slopes[:, [i, j], [j, i], k]
         added = np.einsum("sijk,sk,sj->si", alone, qd, qd) - np.einsum("sijk,si,sj->sk", alone, qd, qd) / 2.0
         for explains, factor in OF_SLOPES.items() if added.any() else ():
             values = equations.with_bias(velocity_terms + (factor - 1.0) * added, rest)
             place = f"dM[{speeds[i]}][{speeds[j]}]/d {speeds[k]} in h"
-            yield variant(2, "derivative", place, "once", explains, values)
+            yield hypothesis(2, "derivative", place, "once", explains, values)
 
 
-def exchanged_angles(equations: Equations) -> Iterator[Variant]:
-    """Sine and cosine of a hinge exchanged in a part of the equations."""
+def linearized(equations: Equations) -> Iterator[Hypothesis]:
+    """Sines and cosines of a hinge, or of all, to first order: sin a = a, cos a = 1; or all of the equations."""
     tree, layout = equations.tree, equations.layout
-    for (name, joint), zero in zip(equations.joints.items(), tree.reference):
-        if joint.kind == "hinge":
+    joints = [(i, joint) for i, joint in enumerate(tree.coordinates.joints) if joint.kind == "hinge"]
+
+    def first_order(q: np.ndarray, those: list[int]) -> np.ndarray:
+        """Values, to first order in some hinges; exact for sums of their sines and cosines."""
+        if not those:
+            return Equations(tree, q, equations.qd, layout).right
+        k, zero = tree.coordinates.joints[those[0]].q.start, tree.reference[those[0]]
+        at = {angle: q.copy() for angle in (0.0, 0.5, -0.5)}
+        for angle, moved in at.items():
+            moved[:, k] = zero + np.pi * angle
+        still, up, down = (first_order(moved, those[1:]) for moved in at.values())
+        return still + (q[:, k : k + 1] - zero) * (up - down) / 2.0
+
+    sets = {tree.joint_names[i]: [i] for i, _ in joints}
+    if 1 < len(joints) <= MOST_HINGES:
+        sets[listed([*sets])] = [i for i, _ in joints]
+    for name, those in sets.items():
+        place = f"sine and cosine of {name}"
+        yield hypothesis(
+            2, "angle", place, "", "linearized, sin a = a and cos a = 1", first_order(equations.q, those)
+        )
+    if "ball" not in tree.kind:
+        zero, unit = np.tile(tree.zero, (len(equations.q), 1)), 1j * TINY * np.eye(equations.nv)
+        still = Equations(tree, zero, equations.qd)
+        slopes = [Equations(tree, zero + step, equations.qd).parts[2].imag / TINY for step in unit]
+        rest = still.parts[2] + np.einsum("jsi,sj->si", slopes, equations.q - zero)
+        values = layout.packed(still.parts[0], 0.0 * rest, rest)
+        yield hypothesis(2, "angle", "equations", "", "linearized about the zero position", values)
+
+
+def sums_of_angles(equations: Equations) -> Iterator[Hypothesis]:
+    """The angle of a hinge in M and h plus or minus that of another one, while the speeds are its own."""
+    tree, layout = equations.tree, equations.layout
+    hinges = [(name, joint.q.start) for name, joint in equations.joints.items() if joint.kind == "hinge"]
+    for (name, k), (other, of_other) in permutations(hinges, 2) if len(hinges) <= MOST_HINGES else ():
+        for sign, what in ((1.0, "plus"), (-1.0, "minus")):
             q = equations.q.copy()
-            q[:, joint.q] = np.pi / 2.0 + 2.0 * zero - q[:, joint.q]
-            other = Equations(tree, q, equations.qd, layout).right
-            for part, entries in layout.parts.items():
-                values = equations.right.copy()
-                values[:, entries] = other[:, entries]
-                yield variant(2, "angle", f"sine and cosine of {name} exchanged in {part}", "", "", values)
+            q[:, k] += sign * (q[:, of_other] - tree.reference[list(tree.joint_names).index(other)])
+            values = Equations(tree, q, equations.qd, layout).right
+            yield hypothesis(
+                2, "angle", f"angle of {name}", "", f"{what} that of {other}, the speeds as they are", values
+            )
+
+
+def orders_of_rotation(equations: Equations) -> Iterator[Hypothesis]:
+    """Hinges in a row through one point, as Euler angles, in another order: in all, or in the angular velocity."""
+    tree, nv = equations.tree, equations.nv
+    joints, carriers = tree.coordinates.joints, set(tree.body_joint)
+    rows: list[list[int]] = []
+    for i, kind in enumerate(tree.kind):
+        follows = bool(rows) and tree.parent[i] == rows[-1][-1] and i - 1 not in carriers
+        if kind == "hinge" and follows and not np.any(tree.offset[i]):
+            rows[-1].append(i)
+        elif kind == "hinge":
+            rows.append([i])
+    for those in (those for those in rows if 1 < len(those) <= 3):
+        for order in list(permutations(those))[1:]:
+            at_q, at_v = np.arange(len(tree.zero)), np.arange(nv)
+            for i, k in zip(those, order):
+                at_q[joints[i].q.start], at_v[joints[i].qd.start] = joints[k].q.start, joints[k].qd.start
+            axis, reference = tuple(tree.axis[v] for v in at_v), list(tree.reference)
+            for i, k in zip(those, order):
+                reference[i] = tree.reference[k]
+            q, qd, back = equations.q[:, at_q], equations.qd[:, at_v], np.argsort(at_v)
+
+            other = Equations(
+                replace(tree, axis=axis, reference=tuple(reference)), q, qd, Layout(nv, True, False)
+            )
+            own = Equations(tree, equations.q, equations.qd, other.layout)
+            of_rotation, moved = (
+                {name: part.sum(axis=0) for name, part in of.terms.items()} for of in (other, own)
+            )
+            turning = {name: of_rotation[name] for name in OF_ROTATION}
+            moving = {name: term for name, term in of_rotation.items() if name not in OF_ROTATION}
+            names = listed([tree.joint_names[i] for i in order])
+            for place, added in (
+                ("", of_rotation),
+                (" in the angular velocity", turning),
+                (" in the positions", moving),
+            ):
+                values = own.right.copy()
+                for name, term in added.items():
+                    M, velocity_terms, rest = (
+                        term[:, : nv * nv].reshape(-1, nv, nv),
+                        *np.split(term[:, nv * nv :], 2, 1),
+                    )
+                    parts = M[:, back][:, :, back].reshape(len(M), -1), velocity_terms[:, back], rest[:, back]
+                    values += np.concatenate(parts, axis=1) - moved[name]
+                M, velocity_terms, rest = (
+                    values[:, : nv * nv].reshape(-1, nv, nv),
+                    *np.split(values[:, nv * nv :], 2, 1),
+                )
+                values = equations.layout.packed(M, velocity_terms, rest)
+                yield hypothesis(2, "order", f"order of the rotations{place}", "", names, values)
 
 
 def functions_of(equations: Equations, hinges: dict[str, np.ndarray]) -> Functions:
@@ -178,7 +236,8 @@ def functions_of(equations: Equations, hinges: dict[str, np.ndarray]) -> Functio
         for power, called in {1: name, 2: f"{name}^2"}.items() if joint.kind == "slide" else ():
             length = equations.q[:, joint.q.start] ** power
             every |= {f"{called} {function}": length * column for function, column in values.items()}
-            all_pairs += [(f"{called} {wrong}", f"{called} {right}") for wrong, right in pairs]
+            times = {function: f"{called} {function}" if function != "0" else "0" for function in values}
+            all_pairs += [(times[wrong], times[right]) for wrong, right in pairs if wrong in times]
     return every, [(wrong, right) for wrong, right in all_pairs if wrong in every]
 
 
@@ -208,11 +267,10 @@ def factors_of(hinge: str) -> dict[str, tuple[str, ...]]:
     }  # fmt: skip
 
 
-def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
+def other_angles(equations: Equations, search: Search) -> Iterator[Hypothesis]:
     """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
     joints = zip(equations.joints.items(), equations.tree.reference)
     hinges = {name: equations.q[:, at.q.start] - zero for (name, at), zero in joints if at.kind == "hinge"}
-    yield from exchanged_angles(equations)
     added = list(parallel(search, unit_columns(equations).items()))
     places = [place for place in search.places if place.kind in OF_FACTORS]
     places.sort(key=lambda place: OF_FACTORS.index(place.kind))
@@ -233,14 +291,16 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Variant]:
             said = f"{terms[yours]} instead of {terms[other]}"
             said = f"{terms[other]} left out" if yours == "0" else said
             said = f"{terms[yours]} added" if other == "0" else said
-            yield variant(2, "angle", place, "", said, search.right + (size * changes[k])[:, None] * column)
+            yield hypothesis(
+                2, "angle", place, "", said, search.right + (size * changes[k])[:, None] * column
+            )
     for (place, column, _), name in product(multiplied, hinges):
         for yours, other in permutations(("1", f"sin({name})", f"cos({name})"), 2):
             change = functions[yours] / functions[other] - 1.0
             said = f"{yours} for {other}"
             said = f"{other} left out" if yours == "1" else said
             said = f"{yours} too many" if other == "1" else said
-            yield variant(2, "factor", place, "", said, search.right + change[:, None] * column)
+            yield hypothesis(2, "factor", place, "", said, search.right + change[:, None] * column)
 
 
 def parallel(search: Search, columns: Iterable[tuple[str, np.ndarray]]) -> Iterator[Parallel]:
