@@ -119,8 +119,10 @@ def add_absent(result: SpeedResult, setup: Setup) -> None:
         groups.setdefault((engine, reason), []).append(method)
     for (engine, reason), names in groups.items():
         for scene in result.floors:
-            about = {"scene": scene, "engine": engine, "method": ", ".join(names), "unit": result.unit}
-            result.rows.append(RunRow(**about, why_not=reason))
+            method = ", ".join(names)
+            result.rows.append(
+                RunRow(scene=scene, engine=engine, method=method, unit=result.unit, why_not=reason)
+            )
     for row in [row for row in result.rows if row.why_not and row.scheme]:
         groups.setdefault((row.engine, row.why_not or ""), []).append(row.method)
     for (engine, reason), names in groups.items():

@@ -1,6 +1,7 @@
 """Figures of speed: time over error, of each scene and on the first screen."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,7 +28,7 @@ def draw(rows: Sequence[RunRow], floor: float, unit: str, size: tuple[float, flo
         of_engine = [row for row in timed if row.largest_error <= COARSE_END]
         if not (best := front(of_engine)):
             continue
-        look = {"color": COLOURS[engine], "marker": MARKS[engine]}
+        look: dict[str, Any] = {"color": COLOURS[engine], "marker": MARKS[engine]}
         ax.plot(*drawn(of_engine), linestyle="none", markersize=3, alpha=0.3, **look)
         ax.plot(*drawn(best), label=LABELS[engine], markersize=4.5, linewidth=1.2, **look)
         if use := cheapest(of_engine, TARGET):
@@ -57,7 +58,7 @@ def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[st
     return file_name("speed", scene), draw(ran, result.floors[scene], result.unit), caption
 
 
-def draw_overview(result: SpeedResult, **uses: object) -> tuple[str, Figure, Finding]:
+def draw_overview(result: SpeedResult, **uses: Any) -> tuple[str, Figure, Finding]:
     """The runs of the scene in which errors are regular, for the first screen."""
     rows = [row for row in result.rows if row.scene == result.regular]
     figure = draw(rows, result.floors[result.regular], result.unit, SIZE)

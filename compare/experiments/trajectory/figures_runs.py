@@ -53,23 +53,21 @@ def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Fig
 
 
 def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding]:
-    """One scene under each scheme: angles, rates, and the difference under its band; grey: not judged."""
+    """One scene under each scheme: movements, speeds, and the difference under its band; grey: not judged."""
     runs = [run for run in result.runs if run.case.name == case.name]
     steps = max(run.steps for run in runs if run.steps <= 16 * case.steps)
     runs = [run for run in runs if run.steps == steps]
-    shown, unit, step = (
-        differing_most(case, runs),
-        movement_unit(case.coordinates),
-        step_in_words(case, steps),
-    )
+    shown, unit = differing_most(case, runs), movement_unit(case.coordinates)
+    step = step_in_words(case, steps)
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
     axes = fig.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
     for (positions, speeds, below), run in zip(axes.T, runs):
-        for ax, name in ((positions, "q"), (speeds, "v")):
-            paths = [
-                (engine, drawable(case, name, getattr(path, name))) for engine, path in run.paths.items()
-            ]
-            alive = [run.until_diverged(engine, values) for engine, values in paths]
+        moved = {engine: case.coordinates.difference(path.q, path.q[0]) for engine, path in run.paths.items()}
+        for ax, of_engines in (
+            (positions, moved),
+            (speeds, {name: path.v for name, path in run.paths.items()}),
+        ):
+            alive = [run.until_diverged(engine, of_engine) for engine, of_engine in of_engines.items()]
             over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
@@ -77,17 +75,15 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     values = values[np.isfinite(values)]
     if (values <= DRAWN_ZERO).any():
         zero_at_the_end(axes[2, 0].yaxis, DRAWN_ZERO, values.max(), most=6)
-    turns = unit == "rad" and not case.coordinates.has_balls
-    place, speed = ("angle", "rate") if turns else ("position", "speed")
-    label_axis(axes[0, 0], place, unit)
-    label_axis(axes[1, 0], speed, f"{unit.replace(' or', '/s or')}/s")
-    axes[2, 0].set_ylabel(f"{place}: difference, {unit}" if unit == "rad" else f"difference, {unit}")
+    label_axis(axes[0, 0], "movement", unit)
+    label_axis(axes[1, 0], "speed", f"{unit.replace(' or', '/s or')}/s")
+    axes[2, 0].set_ylabel(f"difference, {unit}")
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
     caption = result.finding(
         "figure_run", scene=case.robot.scene_begins(case.name), shown=len(shown),
-        positions=case.coordinates.nv, balls=case.coordinates.has_balls,
+        positions=case.coordinates.nv,
         share=largest_known([row.difference_over_band for row in rows]),
         judged=[(run.integrator, run.judged_until) for run in runs],
     )  # fmt: skip
@@ -148,21 +144,6 @@ def label_axis(ax: Axes, name: str, unit: str) -> None:
     ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
 
 
-def drawable(case: Case, name: str, values: np.ndarray) -> np.ndarray:
-    """Positions "q" or speeds "v", (times, nv); of a ball its movement, NaN where it passes half a turn."""
-    coordinates = case.coordinates
-    if name == "v" or not coordinates.has_balls:
-        return values
-    movements = coordinates.difference(values, values[0])
-    for joint in coordinates.places.joints:
-        if joint.kind == "ball":
-            turned = movements[:, joint.qd]
-            turned[1:][np.linalg.norm(np.diff(turned, axis=0), axis=1) > np.pi] = np.nan
-        else:
-            movements[:, joint.qd] = values[:, joint.q]
-    return movements
-
-
 def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
     """The movements that are drawn: all, or those in which the engines differ most while judged."""
     count = case.coordinates.nv
@@ -177,38 +158,37 @@ def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
 
 def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Each scene: at the left the difference over its band; at the right how long all its runs are judged."""
-    names = [case.name for case in robot.cases if any(row.scene == case.name for row in result.rows)]
-    rows = {name: [row for row in result.rows if row.scene == name] for name in names}
+    durations = {case.name: case.duration for case in robot.cases}
+    names = [name for name in durations if any(row.scene == name for row in result.rows)]
     wrong = [check for check in result.checks if check.failed and check.about == About.MODELS]
     failing = [name for name in names if name in {scene_of(check.scene, names) for check in wrong}]
-    shares = {name: largest_known([row.difference_over_band for row in rows[name]]) for name in names}
+    beginnings, shares, until = result.of_beginnings, {}, {}
+    for name in names:
+        rows = [row for row in result.rows if row.scene == name]
+        shares[name] = largest_known([row.difference_over_band for row in rows])
+        until[name] = [row.judged_until for row in rows if row not in beginnings]
     wrong_first = sorted(names, key=lambda name: name not in failing)[:MOST_ROWS]
     shown = [name for name in names if name in wrong_first]
     fig, (left, right) = chart(2, sharey=True, width_ratios=(1.15, 1))
     left.set(xscale="log", xlim=(LEAST_SHARE, MOST_SHARE if failing else 10.0), xlabel="difference / band")
     for place, name in enumerate(shown):
         colour, mark = (RED, "X") if name in failing else ("black", "D")
-        share = shares[name]
-        if share is not None:
+        if (share := shares[name]) is not None:
             lines_to(left, [share], [place], mark, colour, markersize=4.5)
-    durations = [case.duration for name in shown for case in robot.cases if case.name == name]
-    beginnings = result.of_beginnings
-    until = {name: [row.judged_until for row in rows[name] if row not in beginnings] for name in names}
-    judged = [min(until[name], default=0.0) for name in shown]
-    places = range(len(shown))
-    right.barh(places, durations, height=0.5, color=(GREY, 0.2), label="not judged")
-    right.barh(places, judged, height=0.5, color=BLUE, label="judged at all dt")
+    lengths, judged = [durations[name] for name in shown], [min(until[name], default=0.0) for name in shown]
+    right.barh(range(len(shown)), lengths, height=0.5, color=(GREY, 0.2), label="not judged")
+    right.barh(range(len(shown)), judged, height=0.5, color=BLUE, label="judged at all dt")
     beyond_tolerance(left, 1.0, "1")
     left.set_xticks([1e-4, 1e-2, 1.0])
     left.minorticks_off()
-    right.set(xlabel="time, s", xlim=(0, 1.04 * max(durations)))
+    right.set(xlabel="time, s", xlim=(0, 1.04 * max(lengths)))
     named_rows(left, shown, [name not in failing for name in shown])
     left.tick_params(axis="y", labelsize=8)
     right.grid(axis="y", visible=False)
     fig.legend(loc="outside upper center", ncols=2, fontsize=7)
-    beginning = sorted({row.engine_integrator for row in beginnings})
     caption = result.finding(
         "overview_caption", label=result.label, share=largest_known([*shares.values()]), scenes=len(names),
-        failing=failing, times=sorted({time for times in until.values() for time in times}), beginning=beginning,
+        failing=failing, times=sorted({time for times in until.values() for time in times}),
+        beginning=sorted({row.engine_integrator for row in beginnings}),
     )  # fmt: skip
     return "overview_scenes", fig, caption

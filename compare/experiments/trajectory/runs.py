@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,11 +13,11 @@ from ...core.rows import Row, column
 from ...core.text import say
 from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
 from ...judge import run as rules
+from ...judge.agree import closest
 from ...judge.rounding import NARROW, band, step_rounding
 from ...robots.case import Case
 from ...robots.coordinates import rates_at
 from ...robots.file import steps_afforded
-from .paths import Deviation, Path, check_closest, differences, one_step, path_of
 
 STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 # decay rate times dt up to which RK4 is stable: beyond, each stage multiplies the rounding of the one before
@@ -45,6 +46,15 @@ class TrajectoryRow(Row):
     required: float = column("s")
     diverged_at: float | None = column("s")
     twin_diverged_at: float | None = column("s")
+
+
+class Path(NamedTuple):
+    """The run of one engine at each of its steps."""
+
+    q: np.ndarray  # (steps + 1, nq) rad
+    v: np.ndarray  # (steps + 1, nv)
+    ended: float | None = None  # s: when it diverged
+    left: float | None = None  # s: when it left its start
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -160,6 +170,27 @@ def stable_part(case: Case, scheme: str, dt: float) -> Case:
     return case.changed(duration=case.steps / rate, dt=1.0 / rate)
 
 
+def path_of(case: Case, dynamics: Dynamics, dt: float, steps: int, method: str) -> tuple[np.ndarray, Path]:
+    """The times, (steps + 1,) s, and the path of an engine in a case."""
+    t, q, v, *_ = dynamics.run(*case.start, case.tau, dt, steps, method)
+    left = rules.departure(t, q, case.coordinates)
+    return t, Path(q, v, rules.diverged_at(case, t, q, v), left)
+
+
+def one_step(
+    dynamics: Dynamics, states: Sequence[np.ndarray], tau: np.ndarray, dt: float, method: str
+) -> list[np.ndarray]:
+    """q and v one step after each of the states, q and v."""
+    motion = dynamics.run(states[0], states[1], tau, dt, 1, method)
+    return [motion.q[:, 1], motion.v[:, 1]]
+
+
+def differences(case: Case, states: Sequence[np.ndarray], others: Sequence[np.ndarray]) -> np.ndarray:
+    """Absolute differences of q (times, nq) and v (times, nv) of two runs: (times, 2 nv), movements first."""
+    movements = case.coordinates.difference(states[0], others[0])
+    return np.abs(np.concatenate([movements, states[1] - others[1]], axis=-1))
+
+
 def compare_scheme(
     result: Result, case: Case, dynamics: Mapping[str, Dynamics], steps: int, scheme: str,
     methods: Sequence[Method],
@@ -194,24 +225,30 @@ def compare_scheme(
         count = judged(at, width < widest, run.ends)
         run = replace(run, judged_until=float(at[count - 1]))
         if single.any():
-            apart = differences(case.coordinates, stepped, one_step(mujoco, states, tau, dt, method.name))
-            steps_apart = Deviation(case.coordinates, at[alive][single], apart, rounding)
-            check_level(result, run, "one step", steps_apart)
+            apart = differences(case, stepped, one_step(mujoco, states, tau, dt, method.name))
+            check_level(result, run, "one step", at[alive][single], apart, rounding)
             if (rounding.min(axis=0) >= widest).any():
                 result.not_judged(run.where, "one step", say(result.finding("wide_step")))
         pair = ([one.q[::every][:count], one.v[::every][:count]] for one in paths.values())
-        apart = differences(case.coordinates, *pair)
-        check_level(result, run, "open loop", Deviation(case.coordinates, at[:count], apart, width[:count]))
+        check_level(result, run, "open loop", at[:count], differences(case, *pair), width[:count])
         check_end(result, run)
         runs.append(run)
     return runs
 
 
-def check_level(result: Result, run: Run, level: str, deviation: Deviation) -> None:
-    """A row and a check: the component and the recorded state that come closest to their tolerance."""
-    check = check_closest(result, run.where, f"{level}, {result.label} to MuJoCo", deviation)
-    movements = deviation.difference[:, : deviation.coordinates.nv]
-    largest = None if check.value is None else movements.max()
+def check_level(
+    result: Result, run: Run, level: str, at: np.ndarray, apart: np.ndarray, tolerance: np.ndarray
+) -> None:
+    """A row and a check: the component and the recorded state that come closest to their tolerance.
+
+    at: (states,) s. apart, tolerance: (states, 2 nv), movements in rad or m first, then speeds.
+    """
+    (k, i), coordinates = closest(apart, tolerance), run.case.coordinates
+    unit, joint = coordinates.units[i % coordinates.nv], coordinates.speeds[i % coordinates.nv]
+    unit, place = f"{unit}/s" if i >= coordinates.nv else unit, f"{joint} at t = {at[k]:.3f} s"
+    quantity = f"{level}, {result.label} to MuJoCo"
+    check = result.check(run.where, quantity, apart[k, i], tolerance[k, i], unit, place, True)
+    largest = None if check.value is None else apart[:, : coordinates.nv].max()
     twin_diverged_at, diverged_at = run.ends
     result.rows.append(TrajectoryRow(
         scene=run.case.name, engine_integrator=run.integrator, twin=run.scheme, dt=run.dt, level=level,

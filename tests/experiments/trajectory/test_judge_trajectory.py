@@ -1,16 +1,17 @@
 """The rules of runs, just inside and just outside; errors, departures, the headline."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from edited import setup_of_file
 from trajectory_curves import FREE, HELD, run_of
 
 import tmt
 from compare.experiments.trajectory import errors, headline, runs
-from compare.experiments.trajectory.paths import Deviation, Path
-from compare.experiments.trajectory.runs import TrajectoryResult
+from compare.experiments.trajectory.runs import Path, TrajectoryResult
 from compare.judge.run import widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
@@ -65,9 +66,18 @@ def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, ju
 def level(difference, bar):
     """The check and the row of differences (states, 2 nv)."""
     result, times = TrajectoryResult("trajectory"), np.arange(len(difference)) / 2
-    deviation = Deviation(LIFT_AND_HEAD, times, np.array(difference), np.full(np.shape(difference), bar))
-    runs.check_level(result, run_of(FREE), "open loop", deviation)
+    run, tolerance = replace(run_of(FREE), case=lift_and_head()), np.full(np.shape(difference), bar)
+    runs.check_level(result, run, "open loop", times, np.array(difference), tolerance)
     return result.checks[0], result.rows[0]
+
+
+@cache
+def lift_and_head():
+    """A case of a slide that carries a ball."""
+    inertial = '<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>'
+    ball = f'<body><joint name="head" type="ball"/>{inertial}</body>'
+    lift = f'<body><joint name="lift" type="slide" axis="0 0 1"/>{inertial}{ball}</body>'
+    return setup_of_file(f"<mujoco><worldbody>{lift}</worldbody></mujoco>").robot.case("c")
 
 
 @pytest.mark.parametrize("off, bar", [(0.999, 1.0), (1.001, 1.0), (np.nan, 1.0), (0.0, 0.0), (1e-300, 0.0)])
@@ -134,12 +144,10 @@ def test_of_two_runs_that_diverge_the_step_is_compared_or_nothing_is_judged(ours
 
 def test_a_headline_has_the_share_of_the_band_only_where_nothing_fails():
     for off, said in ((0.9, True), (1.1, False), (np.nan, False)):
-        result, differences = TrajectoryResult("trajectory"), np.zeros((2, 8))
-        differences[1, 2] = off
-        runs.check_level(result, run_of(FREE), "open loop",
-                         Deviation(LIFT_AND_HEAD, np.arange(2.0), differences, np.ones((2, 8))))  # fmt: skip
-        runs.check_level(result, run_of(HELD), "open loop",
-                         Deviation(LIFT_AND_HEAD, np.arange(2.0), np.zeros((2, 8)), np.ones((2, 8))))  # fmt: skip
+        result, apart, bars = TrajectoryResult("trajectory"), np.zeros((2, 6)), np.ones((2, 6))
+        apart[1, 2] = off
+        runs.check_level(result, run_of(FREE), "open loop", np.arange(2.0), apart, bars)
+        runs.check_level(result, run_of(HELD), "open loop", np.arange(2.0), 0.0 * bars, bars)
         found = headline(result)
         assert (found is not None) is said
         assert not said or found.values == {"scenes": 2, "share": pytest.approx(0.9)}

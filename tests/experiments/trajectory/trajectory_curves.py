@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from compare.experiments.trajectory.paths import Path
-from compare.experiments.trajectory.runs import Run
+from compare.experiments.trajectory.runs import Path, Run
 from compare.robots.arm import ARM
 
 NEVER = (None, None)  # of both engines

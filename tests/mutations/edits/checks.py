@@ -9,7 +9,7 @@ CHECKS = (
     ("conclusions", "check_same_schemes", "quantity"), ("conclusions", "check_stopped", "quantity"),
     ("conclusions", "check_smallest_errors", "quantity"),
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
-    ("judge.run", "check_movement", '"movement"'), ("trajectory.paths", "check_closest", "quantity"),
+    ("judge.run", "check_movement", '"movement"'), ("trajectory.runs", "check_level", "quantity"),
     ("stability.limits", "check_limits", "what"),
     ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
     ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
