@@ -52,8 +52,8 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
         scene.rows += called
     result = judged(setup, scenes)
     result.tables["what_should_i_use"] = conclusions.what_to_use(result)
-    result.headline = result.finding("headline", **uses(result))
-    result.top.append(result.finding("answer", **uses(result)))
+    result.headline = result.finding("headline", uses=uses(result))
+    result.top.append(result.finding("answer", uses=uses(result)))
     result.find("columns")
     setup.progress("speed: one evaluation")
     result.tables["evaluations"] = evaluations.costs(loops, setup.of(12, 5, 2))
@@ -91,12 +91,13 @@ def uses(result: SpeedResult) -> dict[str, Any]:
     """What to use where errors are regular, of each engine by error; and the cheapest of all, of tmt and of MuJoCo."""
     table = [row for row in result.tables["what_should_i_use"] if row.scene == result.regular]
     first = [row for row in table if row.target == conclusions.TARGET]
-    by_engine = {LABELS[row.engine]: [one for one in table if one.engine == row.engine] for row in first}
     cheapest = [row for row in first if row.method and (row is first[0] or row.engine in ALWAYS)]
     return {
         "scene": result.regular, "unit": result.unit, "servos_off": result.servos_off,
-        "target": conclusions.TARGET, "targets": conclusions.TARGETS, "engines": by_engine,
-        "cheapest": {LABELS[row.engine]: row for row in cheapest}, "first_steps": FIRST_STEPS,
+        "target": conclusions.TARGET, "targets": conclusions.TARGETS, "first_steps": FIRST_STEPS,
+        "engines": {LABELS[one.engine]: [row for row in table if row.engine == one.engine] for one in first},
+        "cheapest": {LABELS[row.engine]: row for row in cheapest},
+        "extrapolated": any(row.extrapolated for row in table),
     }  # fmt: skip
 
 
@@ -104,12 +105,11 @@ def compilation(rows: Sequence[RunRow]) -> dict[str, float]:
     """Seconds in which each engine has compiled, or loaded, what its methods run, where it took 10 ms."""
     methods: dict[tuple[str, str], float] = {}
     for row in rows:
-        key = LABELS[row.engine], row.method
+        key = row.engine, row.method
         methods[key] = max(methods.get(key, 0.0), row.compile_seconds or 0.0)
-    engines: dict[str, float] = {}
-    for (engine, _), seconds in methods.items():
-        engines[engine] = engines.get(engine, 0.0) + seconds
-    return {engine: seconds for engine, seconds in engines.items() if seconds >= 0.01}
+    engines = dict.fromkeys(row.engine for row in rows)
+    sums = {LABELS[name]: sum(of for key, of in methods.items() if key[0] == name) for name in engines}
+    return {engine: seconds for engine, seconds in sums.items() if seconds >= 0.01}
 
 
 def add_absent(result: SpeedResult, setup: Setup) -> None:
@@ -144,4 +144,4 @@ def overview(results: Mapping[str, SpeedResult], robot: Robot) -> Iterator[parti
 
     result = results["speed"]
     if result.tables.get("what_should_i_use"):
-        yield partial(draw_overview, result, **uses(result))
+        yield partial(draw_overview, result, uses(result))

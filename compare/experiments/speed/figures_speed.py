@@ -58,8 +58,8 @@ def draw_times(result: SpeedResult, scene: str, beginning: str = "") -> tuple[st
     return file_name("speed", scene), draw(ran, result.floors[scene], result.unit), caption
 
 
-def draw_overview(result: SpeedResult, **uses: Any) -> tuple[str, Figure, Finding]:
+def draw_overview(result: SpeedResult, uses: dict[str, Any]) -> tuple[str, Figure, Finding]:
     """The runs of the scene in which errors are regular, for the first screen."""
     rows = [row for row in result.rows if row.scene == result.regular]
     figure = draw(rows, result.floors[result.regular], result.unit, SIZE)
-    return "overview_times", figure, result.finding("overview_caption", **uses)
+    return "overview_times", figure, result.finding("overview_caption", uses=uses)

@@ -174,16 +174,16 @@ def test_a_run_reaches_an_error_that_is_not_smaller_than_its_own(error, target, 
 def test_the_first_screen_has_the_cheapest_of_each_engine_and_says_what_is_extrapolated():
     result = result_of(many_runs())
     values = speed.uses(result)
-    first, _, head, *table, last = screen(result.finding("answer", **values))
+    first, _, head, *table, last = screen(result.finding("answer", uses=values))
     assert [*values["cheapest"]] == ["SciPy", "TMT", "MuJoCo"] and "DOP853, tolerance 1e-07, 0.1 ms" in first
     assert "about 320 ms" in first and "bent, free" in first
     cells = {line.split()[0]: line.split("  ")[1:] for line in table}
     assert [*cells] == ["SciPy", "TMT", "MuJoCo"] and head.split()[-3:] == ["1e-3", "1e-6", "1e-9"]
     assert "RK4 80 ms" in table[2] and "RK4 ~320 ms" in table[2] and table[2].endswith("-") and "512" in last
     whole = result_of([row for row in many_runs() if not row.extrapolated])
-    assert "extrapolated" not in " ".join(screen(whole.finding("answer", **speed.uses(whole))))
+    assert "extrapolated" not in " ".join(screen(whole.finding("answer", uses=speed.uses(whole))))
     none = result_of([run_of("mujoco", "Euler", 0.1)])
-    assert "no setting" in say(none.finding("headline", **speed.uses(none)))
+    assert "no setting" in say(none.finding("headline", uses=speed.uses(none)))
 
 
 class Slow:
