@@ -10,7 +10,7 @@ import pytest
 from edited import XML, edited, setup_of, untimed_speed
 
 from compare.core.check import Result
-from compare.experiments import module, parameters, reduction, stability, trajectory
+from compare.experiments import module, parameters, reduction, trajectory
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
 from compare.run.examine import Setup, in_one, new_causes
@@ -27,7 +27,7 @@ TABLE = '<body pos="1 0 0"><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/><
 TENDON = '<tendon><fixed armature="0.1"><joint joint="beta" coef="1"/></fixed></tendon>'
 
 # experiments that cannot see an edit
-MOTION = "published mass gravity acceleration trajectory speed stability reduction"
+MOTION = "published mass gravity acceleration trajectory speed reduction"
 SEEN = ""  # by all
 NO_FORCE = "kinematics"  # no masses nor forces in positions, speeds and Jacobians
 NO_WEIGHT = "kinematics gravity"  # no inertia in the torque that holds
@@ -90,19 +90,13 @@ def follow(setup) -> Result:
     return result
 
 
-def linearise(setup) -> Result:
-    result = Result("stability")
-    stability.check_equilibria(result, setup)
-    return result
-
-
 def without_some_joints(setup) -> Result:
     scenes = tuple(scene for scene in setup.robot.scenes if scene.name in ("zero, free", "elbow swing"))
     return reduction.rows(replace(setup, robot=replace(setup.robot, scenes=scenes)))
 
 
 STATES = {name: module(name).rows for name in ("published", "kinematics", "mass", "gravity", "acceleration")}
-RUNS = {"trajectory": follow, "speed": untimed_speed, "stability": linearise}
+RUNS = {"trajectory": follow, "speed": untimed_speed}
 RUNS["reduction"] = without_some_joints
 SLOW = pytest.param(RUNS, marks=pytest.mark.slow)
 TRIED = [name for name, (*_, unseen) in EDITS.items() if unseen is not None]

@@ -108,7 +108,7 @@ OPTIONS = {
     "--delay": Option(number("time in s", 0.0, 1.0), "S"),
     "--kp": Option(number("gain", 0.0, HIGHEST_GAIN), "KP"),
     "--kv": Option(number("gain", 0.0, HIGHEST_GAIN), "KV"),
-    "--at-speed": Option(None),
+    "--push": Option(number("push in rad/s or m/s", 1e-9, 1e3), "P"),
     "--error": Option(number("error", 1e-12, 1.0), "E", example=f"{ROBOT} --error 0.001 --write small.xml"),
     "--points": Option(metavar="NAMES"),
     "--controls": Option(metavar="CSV", example=f"{ROBOT} --controls recorded.csv"),

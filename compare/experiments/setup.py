@@ -38,12 +38,11 @@ def nothing(*_: Any) -> None:
 class Request(NamedTuple):
     """What is asked of stability and of reduction for a file, beside its own step.
 
-    step: s, and an integrator of MuJoCo. posture: a name, or numbers with commas. control_period, delay: s,
-    of a program that commands the actuators; kp, kv: its gains for those that are no servos. at_speed: growth
-    along a motion.
+    step: s, and an integrator of MuJoCo. posture: a name, or numbers with commas. push: rad/s or m/s, of every
+    speed. control_period, delay: s, of a program that commands the actuators; kp, kv: its gains, of motors.
+    error: rad or m, that is allowed; controls: times and controls by the names of actuators.
 
-    Of reduction: error, rad or m, that is allowed; points: names of bodies or sites, separated by commas;
-    controls: times and controls by the names of actuators; write: the path of the smaller file.
+    Of reduction: points: names of bodies or sites, separated by commas; write: the path of the smaller file.
     """
 
     step: tuple[float, str] | None = None
@@ -52,7 +51,7 @@ class Request(NamedTuple):
     delay: float | None = None
     kp: float | None = None
     kv: float | None = None
-    at_speed: bool = False
+    push: float | None = None
     error: float | None = None
     points: str | None = None
     controls: Mapping[str, np.ndarray] | None = None

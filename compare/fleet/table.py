@@ -17,6 +17,7 @@ from ..report.document import joined, page_of
 from ..report.provenance import OURS, commit, installed
 from ..report.verdict import Report, Section, failures, worst
 from ..run.reference import Reference
+from ..stability.answer import worst_step
 from .cache import write_whole
 from .models import place_of_report
 
@@ -116,14 +117,9 @@ def judge(row: FileRow, report: Report, reference: Reference) -> None:
 
 
 def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
-    """Whether the file's step is stable in its runs, None if unknown; the smallest limit, s."""
-    limits = [row for section in sections for row in section.result.tables.get("step_limits", ())]
-    own = [row for row in limits if row.integrator == row.file_integrator]
-    stable = [row.stable_at_file_dt for row in own if row.stable_at_file_dt is not None]
-    runs = [row for section in sections for row in section.result.tables.get("own_run", ())]
-    stable += [row.outcome in ("calm", "alike") for row in runs]
-    finite = [row.predicted_dt for row in own if row.limit == "finite"]
-    return (all(stable) if stable else None), min(finite, default=None)
+    """Whether the step in use is stable at every posture, None if unknown; the smallest limit that was found, s."""
+    rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
+    return worst_step(rows)
 
 
 def write_table(out: Path, rows: Sequence[FileRow], left_out: LeftOut, command: str) -> list[str]:

@@ -25,7 +25,7 @@ from ..robots.file import not_compared, robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
 from ..robots.scene_file import read_controls
-from ..stability.place import posture_of
+from ..stability.motion import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
@@ -77,18 +77,16 @@ class Compared(NamedTuple):
     def request_of(self, options: argparse.Namespace) -> Request:
         """What the options ask; ModelError, in one line, for what needs a file or is not of this one."""
         asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
-        given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value]
+        given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value is not None]
         if given and self.reading is None:
             need = f"{' and '.join(given)} {'needs' if len(given) == 1 else 'need'} a robot's file"
             raise ModelError(f"{need}; the numbers of {self.robot.name} are stated")
         dt, integrator = asked.pop("dt"), asked.pop("integrator")
         if self.reading is None or not given:
             return Request()
-        for name in ("delay", "kp"):
-            if asked[name] and not asked["control_period"]:
+        for name in ("delay", "kp", "kv"):
+            if asked[name] is not None and not asked["control_period"]:
                 raise ModelError(f"--{name} is of a program with a --control-period")
-        if asked["kv"] and not asked["kp"]:
-            raise ModelError("--kv needs --kp")
         try:
             name = integrator_by_name(integrator or self.reading.integrator)
             if asked["posture"]:

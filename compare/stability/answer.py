@@ -1,246 +1,261 @@
-"""The answer for a file: rows of limits at its postures, by the derivative of its step, in closed form and in runs."""
+"""The answer for a file: a row for each integrator at a posture, what else its runs show, and what helps."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from ..core.rows import Row, column
-from ..engines.mujoco.forces import rows_at
-from ..engines.mujoco.names import INTEGRATORS, contact_name
+from ..engines.mujoco.names import element_name
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.variants import stands
-from . import runs
-from .closed_form import radius_apart
-from .cures import Cure, cures
-from .growth import Growth
-from .limits import LONGEST, Curve, Limit, limit, tried
-from .place import MOVING, Place, Posture, in_the_air_at, standing_at
-from .rest import SETTLED, Rest
-from .start import StartRuns
+from .motion import Posture, motion_of
+from .push import DAMPED, FAST, PUSHES, USUAL, WAYS, WITHIN, Limit, Pushed
+from .remedies import Remedy, creep_stops, remedies
+from .search import largest
 
-UNHELD = 0.99  # of a limit: lower ones without dry friction
-SHARE = 0.1  # of the energy of a mode: what a contact has more of takes part
-
-
-def step_column(digits: int = 4, **more: Any) -> Any:
-    """A field with a time step, s."""
-    return column("s", digits=digits, **more)
+DRAWN = (0.03, 0.1, 0.3)  # rad/s or m/s: pushes of the picture
+CREEPS = 1e-4  # rad/s or m/s: what should rest and is faster
+LONGEST_PERIOD = 0.5  # s, of a program
+LONGER = 1.2  # fold: a limit that is told beside another one
+EARTH = 30.0  # m/s2: a larger gravity is stated in another unit of length
 
 
 @dataclass(kw_only=True)
 class StepLimitRow(Row):
-    """The step limit of an integrator at a posture: step_limits.csv.
+    """The longest stable step of an integrator, or the longest period of a program, after a push: step_limits.csv.
 
-    limit: finite, none, below, saddle, or no_rest, see limits.Limit; moving, it moves on where others rest.
-    observed_dt, failing_dt: the longest step at which runs hold and the shortest at which they fail; failing_dt alone is None
-    where they hold up to the longest that is tried.
-    start_dt: the longest step up to which a run from the posture itself comes to rest where it rests, where that is lower.
-    limiting_joint, limiting_contact: of the mode that grows beyond predicted_dt; where runs decide, of no limit but that.
-    smooth_dt: the limit without dry friction, where that is lower. growth: per step, at the file's step; apart: in closed form
-    minus that. growth_rate: just beyond the limit; of a saddle that of its fall. finer_push: whether a finer step bears no
-    larger push, asked below the usual push. moved: from the posture to the rest. has_fallen: by a free body.
-    held_objects: loose objects that move on, held where they are. Speeds are in rad/s or m/s, movements in rad or m.
+    Speeds are in rad/s or m/s, distances in rad or m, of joints and free bodies, in the file's unit of length. stable_up_to_s:
+    None: no step down to fine_dt_s; fails_at_s: None: all that are tried hold. moves_first: the joint of the run that fails.
+    end_speed: the largest in the last quarter of the runs, at the step in use and at fine steps. apart: the largest distance
+    from fine runs on the way, at the step in use; within_error_s: the longest step that stays within --error.
+    judged_by: rest; speed, it coasts or is in motion; divergence, it moves on by itself; falls, a stated push is survived at no
+    step; "", no fine run is finite. outcome: of the step in use: holds, moves, grows, elsewhere, diverges. survived: the largest
+    push that fine runs survive of those that were tried. fine_apart: of two fine steps. kept: the share of the speed of fine
+    runs that is left at the step in use, where they coast. creep: of the fine run without a push.
     """
 
     posture: str
-    base: str  # fixed, free
-    surroundings: str  # contact; free, nothing touches; air, contacts off
     integrator: str
-    limit: str
-    predicted_dt: float | None = step_column()
-    observed_dt: float | None = step_column(default=None)
-    failing_dt: float | None = step_column(default=None)
-    start_dt: float | None = step_column(default=None)
-    smooth_dt: float | None = step_column(default=None)
-    file_dt: float = column("s")
-    file_integrator: str
-    stable_at_file_dt: bool | None = None
-    limiting_joint: str = ""
-    limiting_contact: str = ""
-    growth_rate: float | None = column("per_s", default=None)
-    growth: float | None = column(digits=8, default=None)
+    of: str = "step"
+    push_rad_per_s: float
+    stable_up_to_s: float | None = column(digits=3, default=None)
+    fails_at_s: float | None = column(digits=3, default=None)
+    moves_first: str = ""
+    end_speed_file_rad_per_s: float | None = None
+    end_speed_fine_rad_per_s: float | None = None
     apart: float | None = None
-    largest_push: float | None = None
-    finer_push: bool | None = None
-    has_fallen: bool = False
-    moved: float | None = None
-    moved_joint: str = ""
-    creep: float | None = None
+    within_error_s: float | None = column(digits=3, optional=True)
+    stable_at_file_dt: bool | None = None
+    outcome: str = ""
+    judged_by: str = ""
+    file_dt_s: float
+    file_integrator: str
+    period_s: float | None = column(digits=3, optional=True)
+    delay_s: float | None = column(digits=3, optional=True)
+    survived_rad_per_s: float = 0.0
+    place: str = ""
+    controls: str = ""
+    starts: str = ""
+    kept: float | None = None
+    creep_rad_per_s: float = 0.0
     creeping_joint: str = ""
-    held_objects: str = ""
+    fine_dt_s: float = 0.0
+    fine_integrator: str = ""
+    fine_apart: float | None = None
+    by_itself: str = ""
+    unpushed_rad_per_s: float | None = None
+    run_s: float = 0.0
+    unit: str = ""
 
     @property
-    def is_known(self) -> bool:
-        return self.limit in ("finite", "none", "below", "moving")
+    def longest_s(self) -> float:
+        """The longest stable step, s: 0.0: none; inf: all that are tried."""
+        return np.inf if self.stable_up_to_s and self.fails_at_s is None else self.stable_up_to_s or 0.0
 
     @property
-    def is_held_by_friction(self) -> bool:
-        """Whether the limit is lower without dry friction, which holds small deviations at any step."""
-        return self.smooth_dt is not None and self.smooth_dt < UNHELD * self.longest
-
-    def needs_friction(self, dt: float) -> bool:
-        """Whether a step, s, is stable by dry friction alone, as far as small deviations go."""
-        return self.is_held_by_friction and (self.smooth_dt or 0.0) < dt <= self.longest
-
-    @property
-    def is_weak(self) -> bool:
-        """Whether a usual push is borne by a finer step than that in use alone."""
-        if self.largest_push is None or self.has_fallen or self.finer_push:
-            return False
-        return self.largest_push < runs.USUAL_PUSH
-
-    @property
-    def predicted(self) -> float:
-        """The longest stable step by the derivative, s; inf: none fails."""
-        return {"none": np.inf, "moving": np.inf, "below": 0.0}.get(self.limit, self.predicted_dt or 0.0)
-
-    @property
-    def decided_by_runs(self) -> bool:
-        """Whether runs hold or fail elsewhere than at the limit of the derivative."""
-        if not self.is_known or self.observed_dt is self.failing_dt is None:
-            return False
-        holds = (self.observed_dt or 0.0) >= 0.95 * min(self.predicted, LONGEST)
-        return not (holds and (self.failing_dt or np.inf) <= 1.05 * self.predicted)
-
-    @property
-    def longest(self) -> float:
-        """The longest stable step, s; inf: none fails. Runs have the last word."""
-        if self.decided_by_runs:
-            middle = float(np.sqrt((self.observed_dt or 0.0) * (self.failing_dt or 0.0)))
-            return np.inf if self.failing_dt is None else middle
-        return self.predicted
+    def is_damped(self) -> bool:
+        return self.kept is not None and self.kept < DAMPED
 
 
-def integrators_at_rest() -> list[str]:
-    """The integrators of the installed MuJoCo; without implicit, which at rest is implicitfast."""
-    return [name for name in INTEGRATORS if name != "implicit"]
+@dataclass(kw_only=True)
+class TriedRow(Row):
+    """A step that was tried: stability_runs.csv."""
+
+    posture: str
+    integrator: str
+    push_rad_per_s: float
+    dt_s: float = column(digits=4)
+    outcome: str
+    end_speed_rad_per_s: float | None
+    apart: float | None
 
 
-class PlaceAnswer(NamedTuple):
-    """What is known of a place: a row of each integrator, curves of growth, what makes the file's step stable."""
+class Question(NamedTuple):
+    """What is asked of a posture.
 
-    rows: list[StepLimitRow]
-    curves: dict[str, Curve]
-    cures: list[Cure]
-
-
-class Asked(NamedTuple):
-    """What is asked of a place. dt, s, integrator: of the step in use; drawn: with curves; in_runs: with what runs show."""
+    dt, s, integrator: of the step in use. push: None: the usual one. error: rad or m. recorded: controls, see motion_of.
+    control_period, delay: s, of a program; kp, kv: its gains. drawn: with the pushes of the picture; helped: with remedies.
+    """
 
     dt: float
     integrator: str
     integrators: Sequence[str]
+    push: float | None = None
+    error: float | None = None
+    recorded: Mapping[str, np.ndarray] | None = None
+    control_period: float | None = None
+    delay: float | None = None
+    kp: float | None = None
+    kv: float | None = None
     drawn: bool = False
-    in_runs: bool = True
+    helped: bool = False
 
 
-def answers(posture: Posture, reading: Reading, asked: Asked, air: bool = True) -> list[PlaceAnswer]:
-    """All that is asked of a posture: as it stands, and in the air if that is another place."""
-    standing = standing_at(reading, posture)
-    found, other = [answer(standing, asked)], in_the_air_at(standing) if air else None
-    del standing  # its models take memory
-    return [*found, answer(other, asked)] if other else found
+class Answer(NamedTuple):
+    """Rows, in the order of the integrators; steps that were tried; remedies; what stops a creep.
 
-
-def answer(place: Place, asked: Asked) -> PlaceAnswer:
-    """All that is asked of a place."""
-    rows, curves, changes = [], {}, []
-    for integrator in asked.integrators:
-        row, found = limit_row(place, integrator, asked)
-        rows.append(row)
-        if asked.drawn and row.is_known:
-            curves[integrator] = found.curve
-        if place.contacts and integrator == asked.integrator and row.stable_at_file_dt is False:
-            changes = cures(runs_of(place, found, integrator, asked.dt), asked.dt)
-    return PlaceAnswer(rows, curves, changes)
-
-
-def limit_row(place: Place, integrator: str, asked: Asked) -> tuple[StepLimitRow, Limit]:
-    """The limit of an integrator at a place, what the step in use does there, and the search for it."""
-    model, dt = place.model, asked.dt
-    found = limit(model, place.rest, integrator, dt)
-    if found.kind == "saddle" and runs_of(place, found, integrator, dt).is_calm(runs.LIMIT_PUSHES[0], dt):
-        # friction or a stop holds, or what grows remains small
-        found = limit(model, place.rest, integrator, dt, found.growth.rate)
-    at, moved, creep = found.first, np.abs(place.moved), np.abs(found.first.rest.speeds)
-    joint, contact = limiting(place, found.rest, found.growth)
-    row = StepLimitRow(
-        posture=place.posture.name, base="free" if stands(place.reading.model) else "fixed",
-        surroundings=place.surroundings, integrator=integrator, limit=found.kind,
-        predicted_dt=found.dt, file_dt=dt, file_integrator=asked.integrator,
-        limiting_joint=joint, limiting_contact=contact, growth_rate=found.growth.rate or None, growth=at.growth.factor,
-        has_fallen=place.has_fallen, moved=float(moved.max()), moved_joint=place.speed_names[int(np.argmax(moved))],
-        held_objects=place.held_objects,
-    )  # fmt: skip
-    if at.rest.is_found:  # else the speeds are those that Newton's method has tried
-        row.creep, row.creeping_joint = float(creep.max()), place.speed_names[int(np.argmax(creep))]
-    if at.rest.left <= SETTLED and not place.held_objects:
-        row.apart = radius_apart(at.rest, place.tree)
-    moves = found.kind == "no_rest" or (place.is_touching and place.creep > MOVING)
-    if moves and found.kind != "saddle" and not place.falls:
-        row.limit, row.predicted_dt = "moving", None
-    is_asked = place.contacts or integrator == asked.integrator  # in the air the others have no use
-    if row.is_known and is_asked:
-        if asked.in_runs or row.limit == "moving":
-            add_runs(row, place, found)
-        add_smooth_limit(row, place)
-    if row.is_known:
-        row.stable_at_file_dt = dt <= row.longest
-    if row.stable_at_file_dt and asked.in_runs and integrator == asked.integrator and row.limit != "moving":
-        row.start_dt = (
-            StartRuns(place.reading, place.posture, integrator, place).longest(dt, row.longest)
-            if place.contacts
-            else None
-        )
-    return row, found
-
-
-def runs_of(place: Place, found: Limit, integrator: str, longest: float) -> runs.Runs:
-    """Runs from the rest of a place. longest: s, a step that the derivative calls stable; fine ones are finer."""
-    fine, first = min(longest / 2.0, max(longest / runs.FINER, runs.FINEST)), found.first
-    creep = max(place.creep, np.abs(first.rest.speeds).max(initial=0.0) if first.is_stable else 0.0)
-    return runs.Runs(place.model, place.rest, integrator, fine, first.rest.is_held, creep)
-
-
-def add_runs(row: StepLimitRow, place: Place, found: Limit) -> None:
-    """What runs show; they have the last word."""
-    shown = runs_of(place, found, row.integrator, min(row.file_dt, row.predicted or LONGEST))
-    if row.limit == "moving":
-        shown = replace(shown, is_held=np.zeros_like(shown.is_held), creep=0.0)
-        row.creep = shown.fine_speed(runs.LIMIT_PUSHES[0])
-        row.creeping_joint = place.speed_names[int(np.argmax(np.abs(place.speeds)))]
-    row.observed_dt, row.failing_dt = shown.limit(row.file_dt, row.predicted or np.inf)
-    if row.limit != "moving" and row.file_dt <= row.longest:
-        row.largest_push, row.finer_push = shown.largest_push(row.file_dt)
-
-
-def add_smooth_limit(row: StepLimitRow, place: Place) -> None:
-    """The limit without dry friction, if that is lower."""
-    longest = min(row.longest, LONGEST)
-    if place.frictionless is None or not longest:
-        return
-    if not tried(place.frictionless, place.rest, UNHELD * longest, row.integrator).is_stable:
-        row.smooth_dt = limit(place.frictionless, place.rest, row.integrator, row.file_dt).dt
-
-
-def limiting(place: Place, rest: Rest, growth: Growth) -> tuple[str, str]:
-    """What a mode moves: the speed with most of its kinetic energy w' M w, and the contact that takes most of it in a step.
-
-    A contact takes (J w)' (J M^-1 J' + R)^-1 (J w): the part of w that the solver would stop at once. "" if there is none.
+    smaller: where the step in use fails, the largest smaller push after which the limit is longer, and that limit.
     """
-    nv = rest.step.model.nv
-    w = growth.shape[nv : 2 * nv]
-    if not np.abs(w).max(initial=0.0) > 0.0:
-        return "", ""
-    M, rows = rows_at(rest.step, rest.state)
-    energies = np.abs(w.conj() * (M @ w))
-    contact, most = "", SHARE * float(np.abs(w.conj() @ M @ w))
-    for number in sorted(set(rows.contact.tolist()) - {-1}):
-        J, R = rows.J[rows.contact == number], rows.R[rows.contact == number]
-        against, A = J @ w, J @ np.linalg.solve(M, J.T) + np.diag(R)
-        taken = float(np.abs(against.conj() @ np.linalg.solve(A, against)))
-        if taken > most:
-            contact, most = contact_name(rest.step.model, rest.step.data, number), taken
-    return place.speed_names[int(np.argmax(energies))], contact
+
+    rows: list[StepLimitRow]
+    tried: list[TriedRow]
+    remedies: list[Remedy]
+    stops: list[Remedy]
+    smaller: tuple[float, float] | None
+
+    @property
+    def own(self) -> StepLimitRow | None:
+        return next((row for row in self.rows if row.integrator == row.file_integrator), None)
+
+
+def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
+    """The answer to a question. ValueError where nothing moves, or no actuator is there for a program."""
+    if not reading.model.nv:
+        raise ValueError("nothing moves")
+    period, delay = question.control_period, question.delay or 0.0
+    motion = motion_of(reading, posture, question.recorded, question.kp, question.kv, period is not None)
+    pushed = Pushed(motion, question.dt, question.integrator, question.push, period or 0.0, delay)
+    pushed.find_truth(PUSHES[-1] if question.drawn else USUAL)
+    rows = [row_of(pushed, name, question) for name in question.integrators]
+    own, found, stops = next((row for row in rows if row.integrator == question.integrator), None), [], []
+    if question.drawn and rows[0].judged_by == "rest" and period is None:
+        for push in DRAWN:
+            for name in question.integrators if push <= pushed.survived else ():
+                pushed.limit(push, name)
+    smaller = None
+    if question.helped and own and own.stable_at_file_dt is False:
+        found = remedies(pushed) if period is None else []
+        smaller = smaller_push(pushed, own)
+    if question.helped and rows[0].creep_rad_per_s > CREEPS:
+        stops = creep_stops(pushed, pushed.creep()[1])
+    tried = [
+        TriedRow(
+            posture=posture.name, integrator=name, push_rad_per_s=push, dt_s=dt, outcome=verdict.why or "holds",
+            end_speed_rad_per_s=known(verdict.speed), apart=known(verdict.apart),
+        )
+        for (push, dt, name, *_), verdict in pushed.tried.items()
+    ]  # fmt: skip
+    return Answer(rows, tried, found, stops, smaller)
+
+
+def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:
+    """The row of an integrator."""
+    model, push, dt = pushed.model, pushed.push, question.dt
+    fine = [pushed.fine_run(push, way) for way in range(WAYS)]
+    creep, dof = pushed.creep()
+    row = StepLimitRow(
+        posture=pushed.motion.name, integrator=integrator, push_rad_per_s=push, file_dt_s=dt,
+        file_integrator=question.integrator, period_s=question.control_period, delay_s=question.delay,
+        survived_rad_per_s=pushed.survived, controls=pushed.motion.controls, run_s=pushed.lasts,
+        starts=pushed.starts, creep_rad_per_s=creep, creeping_joint=joint_of(model, dof) if creep else "",
+        fine_dt_s=pushed.fine_dt, fine_integrator=pushed.truth, judged_by=pushed.judged_by,
+        end_speed_fine_rad_per_s=known(max(float(run.last.max()) for run in fine)), unit=unit_of(model),
+        by_itself=pushed.by_itself, unpushed_rad_per_s=known(float(pushed.fine_run(0.0, 0).last.max())),
+    )  # fmt: skip
+    if row.judged_by in ("", "falls"):
+        return row
+    row.place = "by chance" if pushed.place_is_chance(push) else ""
+    row.fine_apart = known(max(pushed.twice(push, way) for way in range(WAYS)))
+    if question.control_period is None:
+        limit, verdict = pushed.limit(push, integrator), pushed.verdict(push, dt, integrator)
+    else:
+        limit, verdict = (
+            period_limit(pushed, integrator),
+            pushed.verdict(push, dt, integrator, pushed.period, pushed.delay),
+        )
+        row.of = "period"
+    row.stable_up_to_s, row.fails_at_s = limit.stable_up_to, limit.fails_at
+    row.moves_first = "" if limit.dof is None else joint_of(model, limit.dof)
+    row.end_speed_file_rad_per_s, row.apart = known(verdict.speed), known(verdict.apart)
+    row.stable_at_file_dt, row.outcome = verdict.holds, verdict.why or "holds"
+    row.kept = verdict.kept
+    if question.error is not None:
+        within = question.error
+
+        def is_near(step: float) -> bool:
+            tried = pushed.verdict(push, step, integrator)
+            return tried.holds and tried.apart <= within
+
+        if within > (row.fine_apart or 0.0):  # fine runs know no less
+            row.within_error_s, _ = largest(is_near, dt, pushed.fine_dt, pushed.longest, WITHIN)
+    return row
+
+
+def smaller_push(pushed: Pushed, row: StepLimitRow) -> tuple[float, float] | None:
+    """The largest smaller push after which the limit is longer by LONGER, and that limit, s."""
+    for push in reversed([push for push in PUSHES if push < pushed.push]) if pushed.rests else ():
+        limit = (
+            pushed.limit(push, row.integrator)
+            if row.of == "step"
+            else period_limit(pushed, row.integrator, push)
+        )
+        if (limit.stable_up_to or 0.0) > LONGER * (row.stable_up_to_s or pushed.fine_dt):
+            return push, limit.stable_up_to or 0.0
+    return None
+
+
+def period_limit(pushed: Pushed, integrator: str, push: float | None = None) -> Limit:
+    """The longest period of a program, in whole steps in use, and the shortest that fails. push: None, the usual one."""
+    dt, push, delay = pushed.dt, push or pushed.push, pushed.delay
+
+    def whole(period: float) -> float:
+        return dt * max(1, round(period / dt))
+
+    low, high = largest(
+        lambda period: pushed.verdict(push, dt, integrator, whole(period), delay).holds,
+        pushed.period, dt, max(LONGEST_PERIOD, pushed.period), WITHIN,
+    )  # fmt: skip
+    dof = pushed.verdict(push, dt, integrator, whole(high), delay).dof if high else None
+    return Limit(low and whole(low), high and whole(high), dof)
+
+
+def known(value: float) -> float | None:
+    """None where it is not finite, or beyond what a run of a robot shows."""
+    return value if np.isfinite(value) and value < 1e3 * FAST else None
+
+
+def joint_of(model: mujoco.MjModel, dof: int) -> str:
+    """The name of the joint; of one without a name that of its body."""
+    joint = int(model.dof_jntid[dof])
+    name = model.joint(joint).name
+    return (
+        element_name(model, "joint", joint) if name else element_name(model, "body", model.jnt_bodyid[joint])
+    )
+
+
+def unit_of(model: mujoco.MjModel) -> str:
+    """The unit of speeds: rad/s, m/s, or both; of a file in another unit of length that of the file."""
+    kinds = {int(model.jnt_type[joint]) for joint in model.dof_jntid}
+    turns = kinds - {int(mujoco.mjtJoint.mjJNT_SLIDE)}
+    slides = kinds & {int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_FREE)}
+    length = "m/s" if np.linalg.norm(model.opt.gravity) < EARTH else "the file's units a second"
+    return " or ".join(filter(None, ("rad/s" if turns else "", length if slides else "")))
+
+
+def worst_step(rows: Sequence[StepLimitRow]) -> tuple[bool | None, float | None]:
+    """Whether the step in use is stable at every posture, None if unknown; the shortest limit of its integrator, s."""
+    own = [row for row in rows if row.integrator == row.file_integrator and row.stable_at_file_dt is not None]
+    limits = [row.longest_s for row in own if np.isfinite(row.longest_s)]
+    return (all(row.stable_at_file_dt for row in own) if own else None), min(limits, default=None)

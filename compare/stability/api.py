@@ -2,34 +2,74 @@
 
 from __future__ import annotations  # so that help() shows the short names of types
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..engines.mujoco.names import integrator_by_name
+from ..core.finding import Finding
+from ..core.text import screen
+from ..engines.mujoco.names import INTEGRATORS, integrator_by_name
 from ..engines.mujoco.reading import read
-from .answer import Asked, StepLimitRow, answers, integrators_at_rest
-from .place import posture_of, postures_of
+from .answer import Answer, Question, StepLimitRow, answer
+from .motion import posture_of, postures_of
 
-__all__ = ["StepLimitRow", "step_limits"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["StepLimitRow", "StepLimits", "step_limits"]
+
+
+class StepLimits(Sequence[StepLimitRow]):
+    """The rows of `step_limits`: a sequence, also by the name of an integrator. print() shows the table."""
+
+    def __init__(self, rows: Sequence[StepLimitRow]) -> None:
+        self.rows = list(rows)
+
+    def __getitem__(self, key: Any) -> Any:
+        """limits["Euler"], limits[0], limits[:2]."""
+        if not isinstance(key, str):
+            return self.rows[key]
+        found = {row.integrator: row for row in self.rows}
+        if key not in found:
+            raise KeyError(f"{key!r} was not asked for: expected one of {', '.join(found)}")
+        return found[key]
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[StepLimitRow]:
+        return iter(self.rows)
+
+    def __repr__(self) -> str:
+        return "\n".join(screen(Finding("step_limits", "limits", {"rows": self.rows})))
+
+    def to_frame(self) -> pd.DataFrame:
+        """The rows as a DataFrame of pandas, a column for each field."""
+        import pandas  # it takes long to load
+
+        return pandas.DataFrame([row.record() for row in self.rows])
 
 
 def step_limits(
     mjcf: str | PathLike[str] | object,
     *,
     posture: str | Sequence[float] | None = None,
-    dt: float | None = None,
+    push: float | None = None,
+    error: float | None = None,
+    control_period: float | None = None,
+    delay: float | None = None,
+    kp: float | None = None,
+    kv: float | None = None,
+    controls: Mapping[str, Sequence[float]] | str | PathLike[str] | None = None,
     integrators: Sequence[str] | None = None,
-    in_runs: bool = False,
-) -> list[StepLimitRow]:
-    """Return the largest stable step of each integrator of MuJoCo, for the robot as it stands and in the air.
+) -> StepLimits:
+    """Return the longest stable step of each integrator of MuJoCo: at which a push is survived.
 
-    Contacts, limits, dry friction, equalities, fluid, gravity and all actuators act as the file has them. The robot
-    sinks to its rest, where the derivative of MuJoCo's own step, by central differences, tells whether a small
-    deviation grows.
+    Everything acts as the file has it. The robot starts where the file does, every speed is changed by the push, in four
+    patterns of signs, and a step holds if the runs of 3 s end as still as runs of fine steps do, and where they do.
 
     Parameters
     ----------
@@ -37,37 +77,60 @@ def step_limits(
         A path, MJCF text, or a compiled model, of which a copy is taken: change gains in a loop.
     posture : str or (nq,) numbers, optional
         The name of a keyframe, "qpos0", or positions (deg, m, quaternions). By default the first keyframe, else qpos0.
-    dt : float, optional
-        The step in use, s: where the search begins, and at which `growth` is told. By default the file's.
+    push : float, optional
+        rad/s or m/s, of every speed. By default 0.1, or the largest smaller one that is survived at fine steps.
+    error : float, optional
+        rad or m: `within_error_s` is the longest step that stays so near the run of fine steps.
+    control_period, delay : float, optional
+        s: a program has the servos, reads every period, and acts a delay later; `stable_up_to_s` is the longest period.
+    kp, kv : float, optional
+        Gains of a program that drives the motors: control kp (posture - length) - kv speed.
+    controls : mapping or path, optional
+        "time" (s, from 0 on) and controls by the names of actuators, or a CSV file of these: the step is judged along it.
     integrators : sequence of str, optional
-        Such as ("Euler", "implicitfast"). By default all but implicit, which at rest is implicitfast.
-    in_runs : bool, optional
-        Also run MuJoCo just below and above each limit, and after pushes (seconds instead of tenths of a second).
+        Such as ("Euler", "implicitfast"). By default all of MuJoCo's.
 
     Returns
     -------
-    list of StepLimitRow
-        One for each surroundings ("contact" or "free", then "air" where that differs) and integrator: `predicted_dt`
-        (s; None with limit "none", "saddle" or "no_rest"), `limiting_joint`, `limiting_contact`, `growth`, `moved` ...
+    StepLimits
+        A row for each integrator: limits["implicitfast"].stable_up_to_s, see StepLimitRow; to_frame() for pandas.
 
     Raises
     ------
     ValueError
-        If MuJoCo makes no model of it, or for an unknown posture or integrator.
+        If MuJoCo makes no model of it, nothing moves, or for an unknown posture, integrator or actuator.
 
     Examples
     --------
     >>> model = mujoco.MjModel.from_xml_path("robot.xml")              # doctest: +SKIP
     >>> for kv in (1.0, 3.0, 10.0):                                    # doctest: +SKIP
     ...     model.actuator_biasprm[:, 2] = -kv
-    ...     print(kv, compare.step_limits(model, integrators=["Euler"])[0].predicted_dt)
+    ...     print(kv, compare.step_limits(model, integrators=["Euler"])["Euler"].stable_up_to_s)
     """
     if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
         mjcf = Path(mjcf)
     reading = read(cast(Any, mjcf))  # ModelError for what is no model
-    if isinstance(integrators, str) or (dt is not None and not 0.0 < dt < np.inf):
-        raise ValueError(f"expected a sequence of names and a step above 0 s; not {integrators!r}, {dt!r}")
-    names = [integrator_by_name(name) for name in integrators or integrators_at_rest()]
-    asked = Asked(dt or reading.dt, reading.integrator, names, in_runs=in_runs)
+    if isinstance(integrators, str):
+        raise ValueError(f"expected a sequence of names; not {integrators!r}")
+    numbers = {"push": push, "error": error, "control_period": control_period}
+    for name, number in numbers.items():
+        if number is not None and not 0.0 < number < np.inf:
+            raise ValueError(f"{name} is {number}: expected a number above 0")
+    recorded = None
+    if controls is not None:
+        from ..robots.scene_file import read_controls
+
+        names = [actuator.name for actuator in reading.drive.actuators]
+        is_path = isinstance(controls, str | PathLike)
+        recorded = (
+            read_controls(str(controls), names)
+            if is_path
+            else {name: np.asarray(values, float) for name, values in cast(Any, controls).items()}
+        )
+    question = Question(
+        reading.dt, reading.integrator, [integrator_by_name(name) for name in integrators or INTEGRATORS],
+        push, error, recorded, control_period, delay, kp, kv,
+    )  # fmt: skip
     place = posture_of(posture, reading) if posture is not None else postures_of(reading)[0]
-    return [row for found in answers(place, reading, asked) for row in found.rows]
+    found: Answer = answer(reading, place, question)
+    return StepLimits(found.rows)

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any, cast
 
+import mujoco
 import numpy as np
 
 from tmt.compiled.evaluator import Evaluator
@@ -13,15 +15,13 @@ from ...core.finding import Finding
 from ...engines import LABELS
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.engine import methods_for
-from ...engines.mujoco.forces import forces_near
 from ...engines.mujoco.names import INTEGRATORS as MEMBERS
+from ...engines.mujoco.names import element_name
 from ...engines.mujoco.reading import Reading
-from ...engines.mujoco.step import Step
+from ...engines.mujoco.stepper import Stepper
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...stability.closed_form import COVERED, matrix
-from ...stability.place import postures_of, standing_at
-from ...stability.rest import rest_near
+from ...stability.motion import postures_of
 from .. import Drawing, Experiment
 from ..setup import Setup
 from . import ways
@@ -33,6 +33,7 @@ MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a
 FEW_SPEEDS = 8  # of a robot with all integrators: of others they take minutes
 INTEGRATORS = "Euler", "implicitfast", "implicit", "discrete", "RK4"
 USUAL_INTEGRATOR = "implicitfast"  # of robots whose file's own is none of these
+SETTLED = 3.0  # s, of the run to where a robot stands
 Work = Iterable[list[Measured]]
 
 
@@ -111,33 +112,44 @@ def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured])
 
 
 def contact_rows(reading: Reading) -> list[ContactRow]:
-    """Differences of the step where the file's first posture sinks to, beside the closed form."""
-    posture = postures_of(reading)[0]
-    place = standing_at(reading, posture)
-    if not place.is_touching:
+    """Differences of the step where a run of 3 s from the file's first posture ends.
+
+    The reference is the eps that agrees best with the next one.
+    """
+    posture, model = postures_of(reading)[0], reading.model
+    stepper = Stepper(model, reading.dt, reading.integrator)
+    rest = stepper.roll(stepper.start(posture.key), round(SETTLED / reading.dt)).states[0]
+    states = 2 * model.nv
+    base = touching(stepper, rest, np.zeros(states + model.na))
+    if not base:
         return []
-    integrator = reading.integrator if reading.integrator in COVERED else "implicitfast"
-    step = Step(place.model, float(place.model.opt.timestep), integrator)
-    rest = rest_near(step, place.rest)
-    forces, states = forces_near(step, rest.state), 2 * place.model.nv
-    closed = None if forces is None else matrix(rest, place.tree, forces)[:states, :states]
-    units = ways.units_of(place.tree, ways.STATE)
-    base = step.touching(rest.state, np.zeros(step.size))
+    units = ways.units_of(reading.tree, ways.STATE)
+    matrices = [stepper.derivative(rest, eps)[0][:states, :states] for eps in ways.SIZES]
+    steps = [np.abs(A - finer).max() for A, finer in pairwise(matrices)]
+    truth = matrices[int(np.argmin(steps))]
     rows = []
-    for eps in ways.SIZES:
+    for eps, A in zip(ways.SIZES, matrices):
         changed: set[str] = set()
-        for nudge in eps * np.eye(step.size):
+        for nudge in eps * np.eye(states + model.na):
             for by in (nudge, -nudge):
-                changed |= base ^ step.touching(rest.state, by)
-        A, difference = step.derivative(rest.state, eps)[:states, :states], None
-        if closed is not None:
-            error, *_ = ways.relative(A - closed, closed, (units, units))
-            difference = error if np.isfinite(error) else None
+                changed |= base ^ touching(stepper, rest, by)
+        error, *_ = ways.relative(A - truth, truth, (units, units))
         rows.append(ContactRow(
-            posture=posture.name, integrator=integrator, contacts=len(base), eps=eps, difference=difference,
-            changed="; ".join(sorted(changed)),
+            posture=posture.name, integrator=reading.integrator, contacts=len(base), eps=eps,
+            difference=error if np.isfinite(error) else None, changed="; ".join(sorted(changed)),
         ))  # fmt: skip
     return rows
+
+
+def touching(stepper: Stepper, state: np.ndarray, by: np.ndarray) -> set[str]:
+    """The pairs of geoms whose contacts have forces at a moved state, and how many contacts each has."""
+    m, d = stepper.model, stepper.put(state)
+    mujoco.mj_integratePos(m, d.qpos, by[: m.nv], 1.0)
+    d.qvel += by[m.nv : 2 * m.nv]
+    mujoco.mj_forward(m, d)
+    pairs = [tuple(pair) for pair in d.contact.geom[d.contact.efc_address >= 0].tolist()]
+    names = [" and ".join(element_name(m, "geom", geom) for geom in pair) for pair in pairs]
+    return {f"{name} ({pairs.count(pair)})" for pair, name in zip(pairs, names)}
 
 
 def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: Sequence[Measured]) -> None:

@@ -74,13 +74,13 @@ class CostRow(Row):
 
 @dataclass(kw_only=True)
 class ContactRow(Row):
-    """Centred differences of the step of a robot that stands, beside the closed form."""
+    """Centred differences of the step of a robot that stands, beside those of the eps that agrees best with the next one."""
 
     posture: str
     integrator: str
     contacts: int  # in which forces act
     eps: float
-    difference: float | None  # relative to the size of its unit; None: there is no closed form
+    difference: float | None  # relative to the size of its unit; None: not finite
     changed: str  # pairs that open or close within eps; "": contacts stay
 
 

@@ -9,7 +9,7 @@ from ...engines.mujoco.smaller import Smaller, locked
 from ...engines.mujoco.source import Source
 from ...engines.mujoco.stepper import Stepper
 from ...robots.case import Case
-from ...stability.place import posture_of, postures_of
+from ...stability.motion import posture_of, postures_of
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe

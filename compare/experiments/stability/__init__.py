@@ -8,20 +8,19 @@ from typing import Any, NamedTuple
 from ...core.finding import Finding
 from ...judge.run import leaves_no_digits
 from ...robots import Robot
+from ...stability import push
 from ...stability.held import held
-from ...stability.limits import LONGEST
-from ...stability.runs import FAR, USUAL_PUSH
-from ...stability.start import CALM, PUSH
 from .. import Drawing, Experiment
 from ..setup import Setup
-from . import claims, departure, limits, of_file, own_run
-from .equilibria import check_equilibria, check_reset, own_reset
+from . import claims, departure, limits, of_file
 from .subjects import DAMPINGS, SCHEMES, coarsest_case, methods_of, subjects_of, unit_of_movements
 from .tables import LimitRow, StabilityResult
 
 EXPERIMENT = Experiment(
-    order=100, serves_own=False, overview="limits", first_screen=("answer", "cures", "control"),
-    options=("--dt", "--integrator", "--posture", "--control-period", "--delay", "--kp", "--kv", "--at-speed"),
+    order=100, serves_own=False, overview="limits", first_screen=("answer", "by_itself", "smaller", "remedies", "within"),
+    options=(
+        "--dt", "--integrator", "--posture", "--push", "--error", "--controls", "--control-period", "--delay", "--kp", "--kv",
+    ),
 )  # fmt: skip
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
 
@@ -32,21 +31,22 @@ def skipped(robot: Robot) -> Finding | None:
 
 
 def claim_values(robot: Robot) -> dict[str, Any]:
-    return {
-        "unit": unit_of_movements(robot),
-        "radii": of_file.RADII_WITHIN,
-        "push": USUAL_PUSH,
-        "up_to": LONGEST,
-        "far": of_file.FAR,
-        "creeps": of_file.CREEPS,
-        "run": {
-            "push": PUSH,
-            "calm": CALM,
-            "far": FAR,
-            "faster": own_run.FASTER,
-            "finer": own_run.FINER,
-        },
-    }
+    """The numbers of the definition, for its text."""
+    names = (
+        "USUAL",
+        "WAYS",
+        "LASTS",
+        "STILL",
+        "STILLER",
+        "COASTS",
+        "AS_FAST",
+        "FAST",
+        "GROWS",
+        "ELSEWHERE",
+        "BY_CHANCE",
+    )
+    numbers = {name.lower(): getattr(push, name) for name in names}
+    return numbers | {"unit": unit_of_movements(robot), "longest": push.LONGEST, "within": push.WITHIN}
 
 
 class Runs(NamedTuple):
@@ -88,7 +88,6 @@ def begin_of_stated(setup: Setup) -> list[Runs]:
 
     begun = [
         Runs(start(limits.limit_rows, at, methods=methods, steps=steps), limits.check_limits),
-        Runs((), lambda result, rows: check_equilibria(result, setup)),
     ]
     if saddles:
         runs = start(departure.departures, dts, at=held(robot, saddles[0]), methods=few)
@@ -123,9 +122,6 @@ def add_of_stated(result: StabilityResult, setup: Setup, work: Sequence[Runs]) -
     }
     for runs in work:
         runs.judge(result, list(chain.from_iterable(runs.rows)))
-    if result.centres:
-        case = robot.case(f"{result.centres[0]}, free", posture=result.centres[0])
-        check_reset(result, case, own_reset(case, setup.engines))
     result.find(
         "examined", noun=robot.noun, centres=result.centres, saddles=saddles,
         names=[*robot.postures, *robot.positions], departures=bool(result.tables.get("departure")),
@@ -147,11 +143,18 @@ def headline(result: StabilityResult) -> Finding | None:
 
 def figures(result: StabilityResult, robot: Robot) -> Iterator[Drawing]:
     # matplotlib is for the process that draws
+    from . import figures_of_file
     from . import figures_stability as drawing
 
+    if "step_limits" in result.tables:
+        first = result.tables["step_limits"][0]
+        if first.stable_at_file_dt is not None and first.of == "step":
+            pushes = {row.push_rad_per_s for row in result.tables["stability_runs"]}
+            yield partial(
+                figures_of_file.draw_steps if len(pushes) > 1 else figures_of_file.draw_bars, result
+            )
+        return
     rows = limits_shown(result)
-    if result.growth:
-        yield partial(drawing.draw_growth, result)
     if result.centres and any(row.predicted_dt or row.observed_dt for row in rows):
         yield partial(drawing.draw_limits, result, robot, rows)
     if "departure" in result.tables:

@@ -17,7 +17,6 @@ from ..figures import MOST_ROWS, chart, named_rows
 from .claims import VARIANT, claims_of
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
-from .of_file import OF
 from .subjects import fraction, unit_of_movements
 from .tables import ClaimRow, LimitRow, StabilityResult
 
@@ -30,15 +29,6 @@ SCHEME_LOOKS = {  # colour, dash, name
     "gauss_legendre_4": (PINK, (0, (3, 1, 1, 1, 1, 1)), "Gauss-Legendre 4"),
     "dopri8": (SKY, (0, (4, 2)), "Dormand-Prince 8"),
 }
-GROWTH_LOOKS = {  # colour, dash, marker, width: those that coincide are drawn over each other, the wider one below
-    "Euler": (BLUE, "-", "o", 1.3),
-    "implicitfast": (ORANGE, "-", "s", 3.2),
-    "implicit": (RED, (0, (4, 2)), "D", 1.2),
-    "discrete": (GREEN, "-.", "v", 1.3),
-    "RK4": (PINK, (0, (5, 1)), "^", 1.3),
-}
-TITLES = {"contact": "in contact", "free": "touching nothing", "air": "in the air"}
-MOST_GROWTH = 1.5  # of a step: the upper end of the axis
 MARKS, MUJOCO_MARKS = "ov^DsP", "x+1"
 
 
@@ -126,33 +116,6 @@ def draw_limits(
         "figure_limits", posture=panels[0][0], products=products, **values, **summary(rows)
     )
     return "stability_limits", fig, caption
-
-
-def draw_growth(result: StabilityResult) -> tuple[str, Figure, Finding]:
-    """Growth over step, a panel for each surroundings: lines of integrators, limits by the derivative and in runs."""
-    rows = result.tables["step_limits"]
-    dt, integrator, posture = rows[0].file_dt, rows[0].file_integrator, rows[0].posture
-    fig = Figure(figsize=(WIDTH, 3.8), layout="constrained")
-    panels = fig.subplots(1, len(result.growth), sharey=True, squeeze=False)[0]
-    for ax, (surroundings, curves) in zip(panels, result.growth.items()):
-        for name, curve in curves.items():
-            colour, dash, marker, width = GROWTH_LOOKS[name]
-            ax.plot(*zip(*curve), color=colour, linestyle=dash, linewidth=width, label=name)
-            row = next(row for row in rows if (row.surroundings, row.integrator) == (surroundings, name))
-            looks: dict[str, Any] = {"markersize": 6, "markeredgecolor": "black", "zorder": 4}
-            ax.plot(row.predicted, 1.0, marker, color="white", **looks)
-            if row.decided_by_runs:
-                ax.plot(row.longest, 1.0, marker, color=colour, **looks)
-                ax.axvline(row.longest, color=colour, linewidth=0.8, linestyle=dash)
-        ax.axhline(1.0, color="black", linewidth=0.6)
-        ax.axvline(dt, color="black", linewidth=0.8, linestyle=":")
-        ax.set(xscale="log", xlabel="dt, s", ylim=(0.9, MOST_GROWTH), title=TITLES[surroundings])
-    panels[0].set_ylabel("growth of a deviation in a step")
-    panels[0].plot([], [], "o", color="white", markeredgecolor="black", label="limit by the derivative")
-    panels[0].plot([], [], "o", color=GREY, markeredgecolor="black", label="limit in runs")
-    fig.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=6)
-    values = {"posture": posture, "dt": dt, "integrator": integrator}
-    return "stability_growth", fig, result.finding("figure_growth", OF, **values)
 
 
 def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:

@@ -8,7 +8,7 @@ import numpy as np
 from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...stability.held import Held
-from ...stability.limits import bisected
+from ...stability.search import largest
 from .tables import LimitRow
 
 LINEAR_DEVIATION = 1e-6  # rad, at the start
@@ -18,7 +18,7 @@ FAR = 1e4  # growth beyond which a motion is not linear any more
 GROWTH_MARGIN = 1e-3  # relative: from the second to the last quarter of a run; less is no growth
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 # times the predicted limit; if there is none, the time in which the fastest mode moves: the observed one is sought among them
-TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.997, 1.004, 2.0]), np.array([0.1, 1.0, 10.0])
+TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.997, 1.004, 2.0]), np.array([0.1, 0.1, 1.0, 10.0])
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
@@ -63,13 +63,13 @@ def observed_limit(
     ("always_fails", None) if the smallest does.
     """
 
-    def fails(dt: float) -> bool:
-        return grows(*shares(method, engines, at, dt, steps))
+    def holds(dt: float) -> bool:
+        return not grows(*shares(method, engines, at, dt, steps))
 
-    failed = next((k for k, dt in enumerate(tried) if fails(dt)), None)
-    if not failed:
-        return ("never_fails" if failed is None else "always_fails"), None
-    return "finite", bisected(lambda dt: not fails(dt), tried[failed - 1], tried[failed], 1.0 + BISECTED)[0]
+    low, high = largest(holds, tried[1], tried[0], tried[2], 1.0 + BISECTED)
+    if high is None:
+        low, high = largest(holds, tried[2], tried[2], tried[3], 1.0 + BISECTED)
+    return ("never_fails" if high is None else "always_fails" if low is None else "finite"), high and low
 
 
 def shares(

@@ -6,10 +6,8 @@ from functools import partial
 from ...core.check import Result
 from ...core.rows import Column, Row, column
 from ...engines import LABELS
-from ...stability.answer import step_column
-from ...stability.limits import Curve
 
-time_step = partial(step_column, digits=5)
+time_step = partial(column, "s", digits=5)
 
 
 @dataclass(kw_only=True)
@@ -79,51 +77,7 @@ class ClaimRow(OfMethod):
     run: float | None = column("s", optional=True)
 
 
-@dataclass(kw_only=True)
-class OwnRunRow(Row):
-    """A run of the whole file: own_run.csv."""
-
-    start: str
-    dt: float = time_step()
-    integrator: str
-    outcome: str  # "calm", "worse", "alike" or "fails", see own_run
-    failed_at: float | None = column("s")
-    full_model_rms_speed: float | None
-    full_model_warnings: int
-    full_model_resets: int
-    full_model_calm: bool
-    finer_dt: float | None = column("s")
-    finer_rms_speed: float | None
-    moved: float | None = None  # rad or m, of a run that comes to rest: from the rest of the posture
-    moved_joint: str = ""
-    rests_elsewhere: bool = False
-    has_fallen: bool = False
-
-
-@dataclass(kw_only=True)
-class ControlRow(Row):
-    """A controller at its own rate: control.csv. Limits are None where all that was tried is stable.
-
-    growth: in a period. longest_delay: 0 if it is not stable.
-    """
-
-    posture: str
-    integrator: str
-    period: float = column("s", digits=4)
-    delay: float = column("s", digits=4)
-    growth: float = column(digits=6)
-    grows_in_run: bool
-    longest_period: float | None = column("s", digits=4)
-    longest_delay: float | None = column("s", digits=4)
-    servos: int
-
-    @property
-    def is_stable(self) -> bool:
-        return self.growth <= 1.0
-
-
 @dataclass
 class StabilityResult(Result):
     centres: tuple[str, ...] = ()  # stable postures
     schemes: dict[tuple[str, str], str] = field(default_factory=dict)  # by engine and method
-    growth: dict[str, dict[str, Curve]] = field(default_factory=dict)  # by surroundings and integrator

@@ -1,4 +1,4 @@
-"""What is known of postures and of a step of each method, the same in runs; the run of the whole file at its own step."""
+"""What is known of postures of the arm and of a step of each method, the same in runs."""
 
 import dataclasses
 
@@ -8,35 +8,22 @@ from edited import setup_of_file
 from models import PATHS
 
 import tmt
-from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
-from compare.engines.mujoco import reading
 from compare.engines.mujoco.engine import METHODS as OF_MUJOCO
-from compare.engines.mujoco.step import WholeRun
 from compare.engines.tmt import Tmt
 from compare.experiments import stability
-from compare.experiments.setup import Request, Setup
-from compare.experiments.stability import claims, departure, equilibria, limits, own_run
+from compare.experiments.setup import Setup
+from compare.experiments.stability import claims, departure, limits
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
 from compare.stability.held import held, posture_names
 
 METHODS = Tmt().methods
 BENT, BALL = held(ARM, "bent"), held(ARM, "ball catch")
-FREE = ARM.case("bent, free", posture="bent")
 SWING = """<mujoco><worldbody><body><joint name="swing" axis="0 1 0"/>
   <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody>{keys}</mujoco>"""
 CART_POLE = """<mujoco><worldbody><body><joint name="rail" type="slide" axis="1 0 0" damping="1"/>
   <geom type="sphere" size="0.1" mass="1"/><body><joint name="pole" axis="0 1 0" damping="0.1"/>
   <geom type="sphere" size="0.1" pos="0 0 0.5" mass="2"/></body></body></worldbody></mujoco>"""
-HINGE = """<mujoco><option timestep="0.005" integrator="{integrator}" {option}/><worldbody><body>
-  <joint name="swing" axis="0 1 0" {joint}/><inertial pos="0 0 -0.1" mass="0.1" diaginertia="1e-4 1e-4 1e-4"/>
-  <geom type="box" size="0.1 0.05 0.001" pos="0.1 0 0" mass="0"/></body></worldbody>
-  <actuator>{actuator}</actuator><keyframe>{key}</keyframe></mujoco>"""
-HOVERING = """<mujoco><worldbody><body><freejoint/><geom size="0.1" mass="1"/><site name="t"/></body></worldbody>
-  <actuator><motor site="t" gear="0 0 1 0 0 0"/></actuator><keyframe><key name="go" ctrl="{}"/></keyframe></mujoco>"""
-STIFF = '<position joint="swing" kp="0.2" kv="1"/>'
-
-
 @pytest.mark.parametrize("name, kind, rates", [
     ("zero", "marginal", [0.0, 0.0]), ("hanging", "centre", [10.995j, 4.975j, 4.867j]),
     ("upright", "saddle", [10.995, 4.975, 4.867]), ("ball catch", "saddle", [7.513, 5.300]),
@@ -98,20 +85,12 @@ def test_the_clear_torques_push_as_much_as_sixteen_ulps(engines):
     assert [push[name] / ulp for name in claims.CLEAR_TORQUES] == pytest.approx([16.0, -16.0], rel=0.1)
 
 
-def test_a_reset_is_caught(engines):
-    reset = equilibria.own_reset(FREE, engines)
-    assert reset.finite and reset.resets >= 1 and reset.caught <= reset.first_reset
-    calm = ARM.case("hanging, free", posture="hanging")
-    assert equilibria.own_reset(calm, engines).resets == 0
-
-
 @pytest.mark.slow
 def test_a_small_run_fills_every_table(small):
     small = small("stability")
     assert set(small.tables) == {"departure", "stability_claims"}
     notes = {note.kind: note.values.get("reproduced") for note in small.notes}
     assert [notes[f"claim_{k}"] for k in (1, 2, 3)] == [True, "yes", "bounded"]
-    assert any("silent" in check.quantity for check in small.checks)
 
 
 @pytest.mark.parametrize("posture, without, drawn", [
@@ -125,57 +104,3 @@ def test_what_a_robot_lacks_is_left_out_with_a_reason(engines, posture, without,
     (examined,) = (note.values for note in result.notes if note.kind == "examined")
     assert not examined[without]
     assert [figure()[0] for figure in stability.figures(result, robot)] == drawn
-
-
-def hinge(joint="", integrator="Euler", actuator="", option="", key='<key name="aside" qpos="0.5"/>'):
-    return HINGE.format(joint=joint, integrator=integrator, actuator=actuator, option=option, key=key)
-
-
-@pytest.mark.parametrize("source, outcome", [
-    (hinge('damping="2"', "RK4"), "worse"), (hinge('damping="0.05"'), "calm"),
-    (hinge('stiffness="400"', "implicitfast"), "worse"), (hinge(), "alike"),  # nothing brakes a pendulum
-    (hinge(actuator=STIFF), "worse"), (hinge('frictionloss="0.2"', actuator=STIFF, key=""), "calm"),
-    (hinge(actuator='<dcmotor joint="swing" motorconst="0.8" resistance="0.2"/>'), "worse"),
-    (hinge(actuator='<motor joint="swing" damping="3"/>', integrator="RK4"), "worse"),
-    (hinge(option='density="1000" viscosity="80"'), "worse"),
-    (hinge(option='density="1000" viscosity="80"', integrator="implicit", key=""), "calm"),
-    (hinge(actuator='<general joint="swing" biastype="affine" biasprm="0 0 1"/>', key=""), "fails"),  # at any step
-    (HOVERING.format(9.81), "calm"), (HOVERING.format(0), "alike"),  # it hovers, and falls
-])  # fmt: skip
-def test_what_moves_on_by_its_step_alone_is_not_stable(source, outcome):
-    found = reading.read(source)
-    run = own_run.own_run(next(iter(found.keyframes), ""), found.dt, found.integrator, found)
-    assert run.outcome == outcome
-
-
-@pytest.mark.parametrize("own, finer, worse", [
-    (0.99e-3, 1e-9, False), (1.01e-3, 1e-9, True), (1.01e-3, 1.02e-4, False), (9.9, 1.0, False), (10.1, 1.0, True),
-    (np.nan, 1.0, True),
-])  # fmt: skip
-def test_ten_times_the_speed_at_the_finer_step(own, finer, worse):
-    runs = [WholeRun(np.full(4, speed), None, np.zeros(0)) for speed in (own, finer)]
-    assert own_run.is_worse(*runs) is worse
-    # a motion that goes on is bounded by its fastest part
-    fast = runs[1]._replace(speeds=np.array([100.0, 1.0, 1.0, finer]))
-    assert own_run.is_worse(runs[0], fast) is (worse and (finer < 1e-3 or own != 10.1))
-    assert not own_run.is_worse(runs[0], runs[1]._replace(failed_at=1.0))
-
-
-def quick(source, **asked):
-    """The result of a quick run."""
-    return stability.rows(setup_of_file(source, Setup.quick, request=Request(**asked)))
-
-
-def test_a_file_without_actuators_is_asked_and_so_is_a_requested_step():
-    failed, source = {}, hinge('damping="2"', "RK4", key="")
-    for step in (None, (1e-4, "RK4"), (0.005, "Euler"), (0.004, "RK4")):
-        failed[step] = [check.quantity for check in quick(source, step=step).checks if check.failed]
-    own = failed[None]
-    assert own == [own_run.AT_OWN, AT_OWN_STEP] and own == failed[1e-4, "RK4"] == failed[0.005, "Euler"]
-    assert failed[0.004, "RK4"] == [own_run.AT_OWN, AT_OWN_STEP, own_run.AT_REQUESTED, AT_REQUESTED_STEP]
-
-
-def test_the_first_six_keyframes_are_run():
-    keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(7))
-    rows = quick(hinge('damping="0.05"', key=keys)).tables["own_run"]
-    assert sorted(row.start for row in rows) == [f"k{i}" for i in range(own_run.MOST_POSTURES)]

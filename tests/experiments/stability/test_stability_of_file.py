@@ -1,164 +1,138 @@
-"""Which step is stable for the robot of a file: what is judged and said, and the tables of a run."""
+"""Which step of a file is stable: what is judged and said, and the tables and figures of a run."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 from edited import setup_of_file
-from servo_models import INERTIA
 
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
-from compare.core.text import say
+from compare.core.text import say, screen
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments import stability
 from compare.experiments.setup import Request, Setup
-from compare.experiments.stability import figures_stability, of_file
-from compare.experiments.stability.of_file import MODES, PUSHED
+from compare.experiments.stability import of_file
 from compare.stability.answer import StepLimitRow
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
   <inertial pos="0 0 0" mass="1" diaginertia="0.05 0.05 0.05"/></body></worldbody><actuator>{actuator}</actuator>
   <keyframe><key name="home" qpos="0.1"/><key name="spin" qvel="3"/></keyframe></mujoco>"""
 SERVO, MOTOR = '<position joint="turn" kp="20" kv="5"/>', '<motor joint="turn"/>'
-LIMIT = (-5.0 + (25.0 + 4.0 * INERTIA * 20.0) ** 0.5) / 20.0  # s, of Euler: 17.5 ms
+LIMIT = (-5.0 + (25.0 + 4.0 * 0.05 * 20.0) ** 0.5) / 20.0  # s, of Euler: 19.3 ms
 
 
-def step_row(**more):
-    usual = {
-        "posture": "p", "base": "fixed", "surroundings": "contact", "integrator": "Euler", "limit": "finite", "predicted_dt": 0.1,
-        "file_dt": 0.1, "file_integrator": "Euler", "stable_at_file_dt": True, "growth": 0.9,
-    }  # fmt: skip
-    return StepLimitRow(**usual | more)
+def found_of(actuator=SERVO, dt=0.002, size=Setup.quick, alone=False, text=TURNING, **asked):
+    setup = setup_of_file(text.format(dt=dt, actuator=actuator), size, request=Request(**asked))
+    return stability.rows(replace(setup, alone=alone))
 
 
-def judged(result, rows):
-    of_file.add_checks(result, rows, AT_OWN_STEP)
-    return {(check.quantity, check.scene): check.passed for check in result.checks}
+def said(result, kind):
+    return [say(text) for text in result.top if text.kind == kind]
 
 
-@pytest.mark.parametrize("growth, apart, passes", [
-    (0.9, 0.899e-4, True), (0.9, -0.901e-4, False), (3.0, 2.99e-4, True), (3.0, 3.01e-4, False), (0.9, float("nan"), False),
-])  # fmt: skip
-def test_growth_in_closed_form_within_a_ten_thousandth(result, growth, apart, passes):
-    assert judged(result, [step_row(growth=growth, apart=apart)])[MODES, "p, contact, Euler"] is passes
-
-
-@pytest.mark.parametrize("more, passed", [
-    ({"largest_push": 0.1}, True), ({"largest_push": 0.01}, False), ({"largest_push": 0.0, "finer_push": True}, True),
-    ({"largest_push": 0.0, "finer_push": False}, False), ({"largest_push": 0.0, "stable_at_file_dt": False}, None), ({}, None),
-])  # fmt: skip
-def test_a_usual_push_is_survived_if_a_finer_step_survives_it(result, more, passed):
-    assert judged(result, [step_row(**more)]).get((PUSHED, "p")) is passed
-
-
-def test_the_robot_as_it_stands_is_judged_and_in_the_air_only_if_it_stands_nowhere(result):
-    air = partial(step_row, surroundings="air", posture="air")
-    lost = step_row(limit="no_rest", stable_at_file_dt=None)
-    rows = of_file.in_use([air(), step_row(posture="q"), step_row(predicted_dt=0.05)], "Euler")
-    assert [row.posture for row in rows] == ["p", "q"]
-    assert of_file.in_use([air(), lost], "Euler")[0].posture == "air" and of_file.in_use([air()], "RK4") == []
-    saddle = step_row(limit="saddle", stable_at_file_dt=None)
-    assert of_file.in_use([air(), saddle], "Euler") == []
-    judged(result, [saddle])
-    assert [check.judged for check in result.checks] == [False]
-
-
-def found_of(actuator=SERVO, dt=0.002, size=Setup.quick, **asked):
-    setup = setup_of_file(TURNING.format(dt=dt, actuator=actuator), size, request=Request(**asked))
-    return stability.rows(setup)
+def row(up_to=0.01, fails=0.0106, stable=True, posture="p", **more):
+    usual = {"judged_by": "rest", "outcome": "holds", "by_itself": "rests", "unit": "rad/s", "survived_rad_per_s": 0.1}
+    return StepLimitRow(
+        posture=posture, integrator="Euler", push_rad_per_s=0.1, stable_up_to_s=up_to, fails_at_s=fails,
+        stable_at_file_dt=stable, file_dt_s=0.002, file_integrator="Euler", moves_first="knee", run_s=3.0, fine_dt_s=2.5e-4,
+        **usual | more,
+    )  # fmt: skip
 
 
 def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all():
-    result = found_of()
-    rows = result.tables["step_limits"]
+    rows = found_of().tables["step_limits"]
     assert [(row.posture, row.integrator) for row in rows] == [("home", "Euler")]
-    assert rows[0].predicted_dt == pytest.approx(LIMIT, rel=3e-3)
-    assert rows[0].observed_dt < LIMIT < rows[0].failing_dt
-    assert result.checks and all(check.passed for check in result.checks) and not result.growth
-    full = found_of(size=Setup.small)
-    names = [row.integrator for row in full.tables["step_limits"]]
-    assert names == [name for name in INTEGRATORS if name != "implicit"]
-    assert full.growth["free"].keys() >= {"Euler", "RK4"}
-    assert figures_stability.draw_growth(full)[0] == "stability_growth"
-    assert stability.headline(full).values["row"].integrator == "Euler"
+    full = found_of(size=Setup.small, alone=True)
+    names = [(row.posture, row.integrator) for row in full.tables["step_limits"]]
+    assert names == [*(("home", name) for name in INTEGRATORS), ("spin", "Euler")]
+    tried = full.tables["stability_runs"]
+    assert {row.push_rad_per_s for row in tried if row.posture == "home"} >= {0.03, 0.1, 0.3}
+    names = [figure()[0] for figure in stability.figures(full, None)]
+    assert names == ["stability_steps"] == [figure()[0] for figure in stability.figures(found_of(), None)]
 
 
-def answers_of(result):
-    return [finding for finding in result.top if finding.kind == "answer"]
-
-
-@pytest.mark.parametrize("more, told", [
-    ({"observed_dt": 0.09, "failing_dt": 0.12, "predicted_dt": 0.3}, ["by_derivative"]),
-    ({"largest_push": 0.01, "finer_push": True}, ["push"]), ({"largest_push": 0.1, "finer_push": True}, []),
-    ({"smooth_dt": 0.09}, ["friction"]), ({"smooth_dt": 0.09, "file_dt": 0.08}, []), ({}, []),
+@pytest.mark.parametrize("dt, asked, quantity, passes", [
+    (0.002, {}, AT_OWN_STEP, True), (1.05 * LIMIT, {}, AT_OWN_STEP, False),
+    (0.002, {"step": (1.05 * LIMIT, "Euler")}, AT_REQUESTED_STEP, False),
+    (1.05 * LIMIT, {"step": (0.01, "Euler")}, AT_REQUESTED_STEP, True),
+    (0.002, {"control_period": 0.01}, of_file.AT_PERIOD, True), (0.002, {"control_period": 0.05}, of_file.AT_PERIOD, False),
+    (0.002, {"control_period": 0.01, "kp": 5.0}, of_file.AT_PERIOD, None),  # it has no motor
 ])  # fmt: skip
-def test_a_fact_is_told_where_it_matters(more, told):
-    kinds = []
-    of_file.add_facts(lambda kind, **values: kinds.append(kind), step_row(**more))
-    assert kinds == told
+def test_the_step_that_is_asked_for_is_judged(dt, asked, quantity, passes):
+    (check,) = found_of(dt=dt, **asked).checks
+    assert (check.quantity, check.passed if check.judged else None) == (quantity, passes)
 
 
-def test_a_figure_marks_the_limit_of_runs_beside_that_of_the_derivative(result):
-    """The last word and the headline are that of runs, where they are others."""
-    rows = [step_row(), step_row(integrator="RK4", observed_dt=0.04, failing_dt=0.042)]
+def test_the_posture_that_is_asked_for_is_the_start():
+    home, other = (found_of(**asked).tables["step_limits"][0] for asked in ({}, {"posture": "spin"}))
+    assert home.by_itself == "rests" and other.by_itself == "in motion" and other.posture == "spin"
+
+
+def test_a_step_that_fails_is_said_with_what_helps():
+    result = found_of(dt=1.4 * LIMIT, size=Setup.small)
+    (answer,) = said(result, "answer")
+    assert answer.startswith("Not stable") and "home" in answer and "(turn)" in answer and "19 ms" not in answer
+    (helps,) = said(result, "remedies")
+    assert "implicitfast" in helps and "kv" in helps and "armature" in helps
+    assert not said(found_of(), "remedies") and said(found_of(), "answer")[0].startswith("Stable: 2 ms with Euler")
+
+
+def test_the_table_of_a_run_alone_has_a_line_for_each_integrator_and_few_lines_in_all():
+    result = found_of(size=Setup.small, alone=True)
+    lines = [line for text in result.top for line in screen(text)]
+    assert len(lines) <= 12 and [line.split()[0] for line in lines if line.startswith(" ")][1:] == list(INTEGRATORS)
+
+
+@pytest.mark.parametrize("more, words", [
+    ({}, "Stable"), ({"stable": False, "outcome": "moves", "end_speed_file_rad_per_s": 0.8}, "shakes at 0.8 rad/s"),
+    ({"stable": False, "outcome": "diverges"}, "diverges"), ({"stable": False, "outcome": "elsewhere"}, "elsewhere"),
+    ({"stable": False, "up_to": None, "outcome": "grows"}, "None is, down to 0.25 ms"),
+    ({"up_to": 0.2, "fails": None}, "up to 200 ms"), ({"stable": None, "judged_by": ""}, "Not judged"),
+    ({"stable": None, "judged_by": "falls"}, "Not judged"),
+])  # fmt: skip
+def test_each_outcome_has_its_answer(result, more, words):
+    of_file.tell(result, "answer", row=row(**more), rows=[])
+    assert words in say(result.top[0])
+
+
+@pytest.mark.parametrize("by_itself, words", [
+    ("rests", "no push"), ("falls freely", "nothing is below it"), ("in motion", "in motion"), ("moves on", "1.8 rad/s"),
+])  # fmt: skip
+def test_what_the_robot_does_by_itself_is_said(result, by_itself, words):
+    of_file.tell_of_row(result, row(judged_by="divergence", by_itself=by_itself, unpushed_rad_per_s=1.8))
+    assert words in say(result.top[0])
+
+
+@pytest.mark.parametrize("up_to, fails, stable, passes", [
+    (0.0020001, 0.0021, True, True), (0.0019, 0.002, False, False), (None, 0.0005, False, False), (0.2, None, True, True),
+    (None, None, None, None),
+])  # fmt: skip
+def test_a_check_of_each_posture(result, up_to, fails, stable, passes):
+    of_file.check(result, row(up_to, fails, stable, judged_by="rest" if stable is not None else ""), AT_OWN_STEP)
+    (check,) = result.checks
+    assert (check.passed if check.judged else None) is passes
+
+
+def test_other_postures_are_told_and_the_worst_is_the_headline(result):
+    rows = [row(), row(0.001, 0.00106, False, posture="crouch"), row(0.2, None, posture="sit")]
+    of_file.tell(result, "others", rows=rows[1:], unstable=rows[1:2])
+    (text,) = said(result, "others")
+    assert "sit over 200 ms" in text and "not stable: crouch (1 ms)" in text
     result.tables["step_limits"] = rows
-    result.growth = {"contact": {row.integrator: [(0.01, 0.9), (0.2, 1.2)] for row in rows}}
-    (ax,) = figures_stability.draw_growth(result)[1].axes
-    marks = [
-        (line.get_xdata()[0], line.get_color() == "white") for line in ax.lines if len(line.get_xdata()) == 1
-    ]
-    assert marks == [(0.1, True), (0.1, True), (pytest.approx(0.041, rel=1e-3), False)]
+    assert of_file.headline(result).values["row"].posture == "crouch"
+    result.tables["step_limits"] = [replace(rows[0], stable_at_file_dt=None)]
+    assert of_file.headline(result) is None
 
 
-@pytest.mark.parametrize("more, last", [({}, "100 ms"), ({"start_dt": 0.08}, "80 ms in runs from p itself")])
-def test_a_headline_has_the_limit_with_the_last_word_alone(result, more, last):
-    result.tables["step_limits"] = [step_row(**more)]
-    assert say(stability.headline(result)) == f"stable at 100 ms (limit: {last})"
+def test_the_longest_step_within_an_error_is_told(result):
+    near = [row(within_error_s=0.004), replace(row(within_error_s=0.009), integrator="RK4")]
+    of_file.tell(result, "within", rows=near, error=0.01)
+    of_file.tell(result, "within", rows=[row()], error=1e-9)
+    first, second = said(result, "within")
+    assert "9 ms with RK4" in first and "Euler: 4 ms" in first and "No step" in second
 
 
-def test_a_step_beyond_its_limit_fails_and_is_told_what_helps():
-    result = found_of(dt=0.02, step=(0.01, "Euler"))
-    failed = {check.quantity for check in result.checks if check.failed}
-    assert AT_OWN_STEP in failed and AT_REQUESTED_STEP not in failed
-    answers = [answer.values for answer in answers_of(result)]
-    stable = [(answer["row"].stable_at_file_dt, answer["requested"]) for answer in answers]
-    assert stable == [(False, False), (True, True)]
-    assert result.top[0] is answers_of(result)[0]
-    (cures,) = (finding.values for finding in result.top if finding.kind == "cures")
-    assert {cure.change for cure in cures["cures"]} >= {"less_kv", "more_armature"}
-
-
-@pytest.mark.parametrize("actuator, gains", [(SERVO, {}), (MOTOR, {"kp": 20.0, "kv": 5.0})])
-def test_a_program_at_its_own_rate_is_judged(actuator, gains):
-    """A period of 20 ms is beyond the limit of 17.5 ms, one of 10 ms is not, and one that is late may be."""
-    for period, delay, stable in ((0.02, None, False), (0.01, None, True), (0.01, 0.0185, False)):
-        result = found_of(actuator, control_period=period, delay=delay, posture="home", **gains)
-        (row,) = result.tables["control"]
-        assert (row.period, row.delay, row.servos) == (period, 0.02 if delay else 0.0, 1)  # in whole steps
-        assert row.is_stable is stable and row.grows_in_run is not stable
-        passed = [check.passed for check in result.checks if "control period" in check.quantity]
-        assert passed == [stable, True]
-        of_file.add_control(result, replace(row, grows_in_run=stable))  # not as predicted
-        assert [check.passed for check in result.checks][-2:] == [stable, False]
-        if delay is None:
-            assert 0.012 < row.longest_period < 0.02
-    result = found_of(MOTOR, control_period=0.02)
-    assert "control" not in result.tables
-    assert any(not check.judged and "control period" in check.quantity for check in result.checks)
-
-
-def test_a_motion_is_judged_by_what_its_step_adds():
-    (home, spin) = found_of(at_speed=True).tables["motion_stability"]
-    assert (home.posture, spin.posture) == ("home", "spin") and home.passed and spin.passed
-    fails = found_of(dt=0.025, at_speed=True)
-    assert [row.passed for row in fails.tables["motion_stability"]] == [False, False]
-    assert sum(check.failed and check.quantity == "growth along its motion" for check in fails.checks) == 2
-    worst = max(fails.tables["motion_stability"], key=lambda row: row.rate)
-    headline = stability.headline(fails)
-    assert headline.values["motion"] is worst and say(headline).startswith(
-        "not stable at 25 ms in its motion from "
-    )
-    assert worst.factor == pytest.approx(
-        np.exp(worst.rate)
-    ) and f"{worst.factor:.3g} times per second" in say(headline)
+def test_recorded_controls_are_judged():
+    times = np.linspace(0.0, 0.5, 26)
+    result = found_of(controls={"time": times, "actuator 0": np.sin(9.0 * times)})
+    assert result.tables["step_limits"][0].controls == "record" and result.checks[0].passed

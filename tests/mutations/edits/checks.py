@@ -14,7 +14,7 @@ CHECKS = (
     ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
     ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
     ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),
-    ("failure", "check_reset", "quantity"), ("equilibria", "check_amplification", "quantity"),
+
 )  # fmt: skip
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (

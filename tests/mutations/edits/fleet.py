@@ -1,7 +1,6 @@
 """Wrong verdicts of a fleet, and wrong decisions what to compute."""
 
 EDITS = (
-    ("fleet.table", "own_step", "row.outcome in ('calm', 'alike')", "True", "a file is stable whatever it does"),
     ("fleet.table", "judge", "row.verdict = DIFFER", "row.verdict = AGREE", "a file that differs agrees"),
     ("fleet.table", "judge", "row.verdict = BROKE", "row.verdict = AGREE", "what broke off agrees"),
     ("fleet.table", "judge", "if unfinished:\n _1", "pass", "what differs hides what broke off"),
@@ -10,9 +9,6 @@ EDITS = (
     ("process.workers", "Workers.start", "not self.pool.active", "False", "an idle process that ends is not replaced"),
     ("process.workers", "Workers.start", "timeout=self.limit", "timeout=None", "calls have no time limit"),
     ("process.workers", "timed", "status or LEFT", "status", "a process that ends in a call is awaited"),
-    ("fleet.table", "own_step", "all(stable)", "any(stable)", "one posture at which the step is stable is enough"),
-    ("fleet.table", "own_step", "min(finite, default=None)", "max(finite, default=None)", "the largest of the limits"),
-    ("fleet.table", "own_step", 'row.integrator == row.file_integrator', "True", "limits of any integrator"),
     ("command_line", "request", "option in words[:-1]", "False", "a first joint of the other sense is an option"),
     ("command_line", "process_count", "1", "0", "a fleet may have no process"),
     ("command_line", "number", "least <= kind(text) <= most", "kind(text) <= most", "a step may be negative"),

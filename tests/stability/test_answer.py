@@ -1,0 +1,182 @@
+"""What is asked of a file beside its step: other postures, programs, recorded controls, remedies; the API."""
+
+import mujoco
+import numpy as np
+import pytest
+from pushed_models import INERTIA, KP, KV, LIMIT, compiled, hinge, sphere
+
+import compare
+from compare.engines.mujoco.reading import read
+from compare.stability import remedies
+from compare.stability.answer import Question, StepLimitRow, answer, worst_step
+from compare.stability.motion import posture_of, postures_of
+
+MOTOR = '<motor joint="turn"/>'
+STILL = '<mujoco><worldbody><geom size="0.1"/></worldbody></mujoco>'
+
+
+def asked(text, **more):
+    reading = read(text)
+    question = Question(reading.dt, reading.integrator, [reading.integrator], helped=True)._replace(**more)
+    return answer(reading, postures_of(reading)[0], question)
+
+
+def diverges(text, steps, kp, kv, delay=0):
+    """Whether a plain loop of a program that commands a motor diverges after a push."""
+    model = compiled(text)
+    data, force = mujoco.MjData(model), []
+    data.qvel[:] = 0.1
+    for step in range(round(4.0 / model.opt.timestep)):
+        if step % steps == 0:
+            force.append(-kp * data.qpos[0] - kv * data.qvel[0])
+        read_at = (step - delay) // steps
+        data.ctrl[:] = force[read_at] if read_at >= 0 else 0.0
+        mujoco.mj_step(model, data)
+        if not abs(data.qvel[0]) < 100.0:
+            return True
+    return bool(abs(data.qvel[0]) > 0.05)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004])
+def test_the_longest_period_of_a_program_is_that_of_a_plain_loop(delay):
+    text = hinge(MOTOR)
+    row = compare.step_limits(text, integrators=["Euler"], control_period=0.01, delay=delay, kp=KP, kv=KV)["Euler"]
+    steps, late = [round(time / 0.002) for time in (row.stable_up_to_s, row.fails_at_s)], round(delay / 0.002)
+    assert not diverges(text, steps[0], KP, KV, late) and diverges(text, steps[1], KP, KV, late) and row.of == "period"
+
+
+def test_the_files_servos_in_a_program_are_the_same_law():
+    of_file = compare.step_limits(hinge(), integrators=["Euler"], control_period=0.01)["Euler"]
+    of_motor = compare.step_limits(hinge(MOTOR), integrators=["Euler"], control_period=0.01, kp=KP, kv=KV)["Euler"]
+    assert of_file.stable_up_to_s == of_motor.stable_up_to_s and of_file.controls == "program"
+
+
+def test_a_damper_is_a_program_and_the_limit_of_its_period_is_two_over_its_rate():
+    row = compare.step_limits(hinge(MOTOR), integrators=["Euler"], control_period=0.01, kp=0.0, kv=5.0)["Euler"]
+    assert row.stable_up_to_s <= 2.0 * INERTIA / 5.0 <= row.fails_at_s
+
+
+def test_where_no_period_or_every_one_is_stable_that_is_said():
+    none = compare.step_limits(hinge(MOTOR), control_period=0.01, delay=0.3, kp=400.0, kv=0.1, integrators=["Euler"])
+    assert none["Euler"].stable_up_to_s is None and none["Euler"].stable_at_file_dt is False
+    every = compare.step_limits(hinge(MOTOR), control_period=0.01, kp=0.0, kv=1e-3, integrators=["Euler"])
+    assert every["Euler"].fails_at_s is None and every["Euler"].stable_at_file_dt and "over 500 ms" in str(every)
+
+
+def test_a_program_needs_an_actuator():
+    with pytest.raises(ValueError, match="--kp"):
+        asked(hinge(MOTOR), control_period=0.01)
+    with pytest.raises(ValueError, match="no joint"):
+        compare.step_limits(STILL)
+
+
+def test_the_seventh_keyframe_is_a_posture_and_so_are_numbers():
+    keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(9))
+    reading = read(hinge(keys=keys))
+    assert [posture.name for posture in postures_of(reading)] == [f"k{i}" for i in range(9)]
+    assert posture_of("k8", reading).key == "k8" and posture_of("90", reading).q == (pytest.approx(np.pi / 2),)
+    assert compare.step_limits(hinge(keys=keys), posture="k7", integrators=["Euler"])[0].posture == "k7"
+    with pytest.raises(ValueError, match="k8, qpos0, or 1 numbers"):
+        posture_of("k9", reading)
+
+
+def test_recorded_controls_are_a_motion_that_is_judged_by_its_speed():
+    times = np.linspace(0.0, 1.0, 51)
+    controls = {"time": times, "servo": 0.5 * np.sin(6.0 * times)}
+    row = compare.step_limits(hinge(), controls=controls, integrators=["Euler"])["Euler"]
+    assert row.controls == "record" and row.by_itself == "in motion" and row.run_s == 1.0
+    assert row.stable_at_file_dt and row.stable_up_to_s < 1.2 * LIMIT and row.end_speed_fine_rad_per_s > 0.5
+    slow = compare.step_limits(hinge(dt=1.3 * LIMIT), controls=controls, integrators=["Euler"])["Euler"]
+    assert not slow.stable_at_file_dt
+
+
+def test_remedies_hold_in_plain_runs():
+    text = hinge(dt=2.0 * LIMIT)
+    found = {remedy.change: remedy for remedy in asked(text).remedies}
+    assert set(found) == {"less_kv", "armature"}
+    for change, least in (("less_kv", 1.5), ("armature", 1e-3)):
+        assert found[change].number > least and found[change].speed < 0.05
+    for kv, more, holds in (
+        (KV / found["less_kv"].number, 0.0, True), (KV, found["armature"].number, True),
+        (KV / found["less_kv"].number * 1.6, 0.0, False), (KV, found["armature"].number / 1.6, False),
+    ):  # fmt: skip
+        inertia, dt = INERTIA + more, 2.0 * LIMIT
+        limit = (-kv + (kv**2 + 4.0 * inertia * KP) ** 0.5) / KP
+        assert (dt < 1.05 * limit) is holds
+
+
+@pytest.mark.parametrize("actuator", [
+    '<velocity joint="turn" kv="60"/>', '<damper joint="turn" kv="60" ctrlrange="0 1"/>', '<position joint="turn" kp="5" kv="60"/>',
+])  # fmt: skip
+def test_speed_gains_of_every_kind_of_servo_are_reduced(actuator):
+    keys = '<key name="on" ctrl="1"/>' if "damper" in actuator else ""
+    found = asked(hinge(actuator, dt=0.004, keys=keys))
+    assert not found.own.stable_at_file_dt and "less_kv" in [remedy.change for remedy in found.remedies]
+
+
+def test_more_iterations_are_tried_with_the_time_of_a_step():
+    boxes = "".join(
+        f'<body pos="0 0 {0.11 + 0.2 * k}"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="{4 ** k}"/></body>' for k in range(3)
+    )
+    option = '<option timestep="0.004" iterations="1" ls_iterations="1" solver="{}"/>'
+    for solver in ("CG", "Newton"):
+        text = f'<mujoco>{option.format(solver)}<worldbody><geom type="plane" size="2 2 1"/>{boxes}</worldbody></mujoco>'
+        found = asked(text)
+        given = [remedy for remedy in found.remedies if remedy.change == "iterations"]
+        assert all(remedy.times[0] > 0.0 and remedy.number in remedies.ITERATIONS for remedy in given)
+        if found.own.stable_at_file_dt is False:
+            assert given or found.smaller or not found.own.judged_by == "rest"
+
+
+def test_what_stops_a_creep_is_tried():
+    text = sphere(impratio=3.0, pull=2.0, condim=3, x="")
+    found, pyramidal = asked(text), asked(text.replace('cone="elliptic"', ""))
+    stops = {stop.change: stop.speed for stop in found.stops}
+    assert stops["impratio"] == pytest.approx(found.own.creep_rad_per_s * 3.0 / 100.0, rel=0.05)
+    assert pyramidal.own.creep_rad_per_s > 1e-4 and pyramidal.stops[0].change == "noslip" and pyramidal.stops[0].speed < 1e-6
+    assert not asked(hinge()).stops
+
+
+def test_a_smaller_push_after_which_the_step_is_longer_is_told():
+    limited = hinge('<position joint="turn" kp="2000" kv="40" forcerange="-1000 1000"/>', dt=0.002)
+    tied = limited.replace("</worldbody>", '<geom size="0.01" pos="5 0 0"/></worldbody>')
+    assert asked(tied).smaller is None or asked(tied).smaller[0] < 0.1
+
+
+def test_the_object_is_a_table_a_sequence_and_a_frame():
+    found = compare.step_limits(hinge(), integrators=["implicitfast", "Euler"])
+    assert found["Euler"] is found[1] and [row.integrator for row in found] == ["implicitfast", "Euler"] and len(found) == 2
+    lines = str(found).splitlines()
+    assert any(line.split()[:3] == ["Euler", "18", "ms"] for line in lines) and "0.1 rad/s" in lines[-1]
+    frame = found.to_frame()
+    assert frame.loc[1, "stable_up_to_s"] == found["Euler"].stable_up_to_s and np.isnan(frame.loc[0, "fails_at_s"])
+    with pytest.raises(KeyError, match="was not asked"):
+        found["RK4"]
+
+
+@pytest.mark.parametrize("more, named", [
+    ({"push": 0.0}, "push"), ({"push": float("nan")}, "push"), ({"integrators": "Euler"}, "sequence"),
+    ({"integrators": ["euler"]}, "Euler"), ({"posture": "none"}, "qpos0"), ({"control_period": -1.0}, "control_period"),
+])  # fmt: skip
+def test_what_is_mistaken_is_one_line(more, named):
+    with pytest.raises(ValueError, match=named) as error:
+        compare.step_limits(hinge(), **more)
+    assert "\n" not in str(error.value)
+
+
+def limit_row(up_to, fails, stable, integrator="Euler"):
+    return StepLimitRow(
+        posture="p", integrator=integrator, push_rad_per_s=0.1, stable_up_to_s=up_to, fails_at_s=fails, stable_at_file_dt=stable,
+        file_dt_s=0.002, file_integrator="Euler",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("rows, worst", [
+    ([limit_row(0.01, 0.011, True), limit_row(0.004, 0.0042, True)], (True, 0.004)),
+    ([limit_row(0.01, 0.011, True), limit_row(0.001, 0.0011, False)], (False, 0.001)),
+    ([limit_row(0.2, None, True)], (True, None)), ([limit_row(None, 0.002, False)], (False, 0.0)),
+    ([limit_row(0.01, 0.011, True), limit_row(0.001, 0.0011, False, "RK4")], (True, 0.01)),
+    ([limit_row(None, None, None)], (None, None)), ([], (None, None)),
+])  # fmt: skip
+def test_the_worst_posture_of_the_files_integrator_is_that_of_a_fleet(rows, worst):
+    assert worst_step(rows) == worst

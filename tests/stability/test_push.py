@@ -1,0 +1,172 @@
+"""The longest stable step after a push: against closed forms, MuJoCo's derivative and plain runs with other signs."""
+
+import numpy as np
+import pytest
+from pushed_models import (
+    BOX,
+    FLOOR,
+    INERTIA,
+    KP,
+    LIMIT,
+    UPRIGHT,
+    compiled,
+    end_speed,
+    hinge,
+    leg,
+    linear_limit,
+    sphere,
+)
+
+import compare
+
+SERVO_WITHOUT_KV = '<position joint="turn" kp="400"/>'
+
+
+def limits(text, *integrators, **more):
+    return compare.step_limits(text, integrators=integrators or None, **more)
+
+
+def test_a_servo_of_one_hinge_has_the_limit_of_its_two_by_two_step():
+    row = limits(hinge(), "Euler")["Euler"]
+    assert row.stable_up_to_s < LIMIT < row.fails_at_s * 1.02 and row.stable_up_to_s > 0.9 * LIMIT
+    assert row.fails_at_s / row.stable_up_to_s < 1.061 and row.moves_first == "turn" and row.judged_by == "rest"
+    assert limits(hinge(), "implicitfast")["implicitfast"].fails_at_s is None
+
+
+@pytest.mark.parametrize("dampratio, integrator, limit", [
+    (1.0, "Euler", 0.828427), (1.0, "implicitfast", 0.828427), (0.5, "Euler", 0.618034),
+])  # fmt: skip
+def test_a_sphere_on_a_plane_has_the_limit_of_its_impedance(dampratio, integrator, limit):
+    """4 - 4 x - x^2 / z^2 = 0 with x = dt / timeconst."""
+    row = limits(sphere(dampratio), integrator)[integrator]
+    assert 0.85 * limit * 0.02 < row.stable_up_to_s < 1.02 * limit * 0.02 and row.moves_first == "z"
+
+
+def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
+    """MuJoCo solves the contact force with M, and integrates it with M + dt D."""
+    for integrator, is_raised in (("Euler", True), ("implicitfast", False)):
+        on_floor = limits(leg(integrator), integrator)[integrator]
+        above = limits(leg(integrator, -5.0, 'stiffness="1e5" damping="1e3"'), integrator)[integrator]
+        assert (on_floor.stable_up_to_s > above.longest_s) is is_raised
+        assert on_floor.stable_up_to_s < 1.03 * linear_limit(leg(integrator), integrator)
+
+
+@pytest.mark.parametrize("text", [hinge(), hinge('<position joint="turn" kp="300" kv="2"/>', joint='damping="0.3"'), leg(), sphere()])
+def test_plain_runs_with_other_signs_hold_below_and_fail_above(text):
+    for row in limits(text, "Euler", "RK4")[: 1 if "size=\"0.1\" mass=\"2\"" in text else 2]:
+        rest = row.creep_rad_per_s + max(0.01, row.push_rad_per_s / 2.0)
+        steps = [(0.94 * (row.stable_up_to_s or 0.0), True), (1.08 * (row.fails_at_s or 0.0), False)]
+        for dt, holds in steps:
+            ends = [end_speed(text, dt, row.integrator, row.push_rad_per_s, seed) for seed in range(3)] if dt else []
+            assert not ends or all(speed <= rest for speed in ends) is holds
+
+
+def test_dry_friction_does_not_hide_what_a_push_shows():
+    """It holds small deviations at any step: kv of 5 at twice the limit."""
+    stuck = hinge(joint='frictionloss="0.05"', dt=2.0 * LIMIT)
+    assert end_speed(stuck, 2.0 * LIMIT, "Euler", 1e-6) < 1e-3
+    row = limits(stuck, "Euler")["Euler"]
+    assert not row.stable_at_file_dt and row.stable_up_to_s < 1.1 * LIMIT
+
+
+def test_the_solvers_iterations_are_part_of_the_file():
+    text = (
+        '<mujoco><option timestep="0.002" iterations="1" ls_iterations="1" integrator="implicitfast"/><worldbody>'
+        f'{FLOOR}<body pos="0 0 0.2"><freejoint/><geom type="box" size="0.2 0.1 0.05" mass="3"/>'
+        + "".join(
+            f'<body pos="{x} {y} 0"><joint axis="0 1 0" damping="0.5" frictionloss="0.1" armature="0.01"/>'
+            '<geom size="0.03" pos="0 0 -0.17" mass="0.2"/></body>' for x in (-0.2, 0.2) for y in (-0.1, 0.1)
+        )
+        + "</body></worldbody></mujoco>"
+    )
+    model = compiled(text)
+    model.opt.disableflags = 0
+    few = limits(model, "Euler", "implicitfast")
+    model.opt.iterations = model.opt.ls_iterations = 100
+    assert few[0].longest_s < limits(model, "Euler", "implicitfast")[0].longest_s or few[1].longest_s <= few[0].longest_s
+
+
+def test_what_moves_on_by_itself_is_judged_by_divergence_alone():
+    falling = limits(UPRIGHT.format("", ""), "Euler")["Euler"]
+    assert falling.judged_by == "divergence" and falling.by_itself == "rests" and falling.survived_rad_per_s == 0.0
+    tilted = UPRIGHT.format('damping="0.01"', '<keyframe><key name="tilted" qpos="0.3"/></keyframe>')
+    row = limits(tilted, "Euler")["Euler"]
+    assert row.by_itself == "moves on" and row.stable_at_file_dt and row.unpushed_rad_per_s > 0.05
+    free = limits(BOX.format(floor=""), "Euler")["Euler"]
+    assert free.by_itself == "falls freely" and free.stable_at_file_dt
+    assert limits(BOX.format(floor=FLOOR), "Euler")["Euler"].by_itself == "rests"
+
+
+def test_what_diverges_while_it_falls_is_told():
+    text = UPRIGHT.format("", "").replace('damping=""', "").replace("<geom", '<joint name="tail" axis="1 0 0"/><geom')
+    servo = '<actuator><position joint="tail" kp="2000" kv="200"/></actuator></mujoco>'
+    row = limits(text.replace("</mujoco>", servo), "Euler")["Euler"]
+    assert row.judged_by == "divergence" and not row.stable_at_file_dt and row.outcome == "diverges"
+
+
+def test_undamped_motion_is_judged_by_its_speed_and_numerical_damping_is_told():
+    text = hinge(SERVO_WITHOUT_KV, dt=0.005)
+    found = limits(text)
+    own = found["Euler"]
+    assert own.judged_by == "speed" and own.stable_at_file_dt and own.kept == pytest.approx(1.0, abs=0.05)
+    exact = 2.0 / np.sqrt(400.0 / INERTIA)  # semi-implicit Euler's
+    assert own.stable_up_to_s == pytest.approx(exact, rel=0.08)
+    if "discrete" in [row.integrator for row in found]:
+        assert found["discrete"].is_damped and not own.is_damped
+
+
+def test_weak_growth_is_seen_in_a_longer_run():
+    """RK4 of an undamped hinge just above its limit of 2 sqrt(2)."""
+    omega = np.sqrt(KP / INERTIA)
+    limit = 2.0 * np.sqrt(2.0) / omega
+    row = limits(hinge(f'<position joint="turn" kp="{KP}"/>'), "RK4")["RK4"]
+    assert row.stable_up_to_s < 1.03 * limit
+
+
+def test_a_push_that_is_stated_is_not_lowered():
+    spring = UPRIGHT.format('stiffness="3" damping="0.3"', "")  # rests upright, falls beyond a small push
+    assert 0.0 < limits(spring, "Euler")["Euler"].survived_rad_per_s
+    row = limits(UPRIGHT.format("", ""), "Euler", push=0.5)["Euler"]
+    assert row.judged_by == "falls" and row.push_rad_per_s == 0.5 and row.stable_up_to_s is None
+    assert "not judged" in str(limits(UPRIGHT.format("", ""), "Euler", push=0.5))
+
+
+def test_no_finite_fine_run_is_not_judged():
+    stiff = hinge('<position joint="turn" kp="1e14"/>', keys='<key name="off" qpos="0.2" ctrl="0.1"/>')
+    row = limits(stiff, "Euler")["Euler"]
+    assert row.judged_by == "" and row.stable_at_file_dt is None and row.stable_up_to_s is None
+
+
+def test_a_keyframe_with_speeds_is_judged_joint_by_joint():
+    spin = hinge('<motor joint="turn"/>', keys='<key name="spin" qvel="3"/>')
+    row = limits(spin, "Euler")["Euler"]
+    assert row.by_itself == "in motion" and row.stable_at_file_dt and row.kept == pytest.approx(1.0, rel=1e-6)
+
+
+def test_an_equality_that_does_not_hold_at_the_start_is_told():
+    text = hinge().replace("</worldbody>", '<body name="b"><joint name="other" axis="0 0 1"/><geom size="0.1"/></body></worldbody>')
+    text = text.replace("</mujoco>", '<equality><joint joint1="turn" joint2="other" polycoef="0.8 1 0 0 0"/></equality></mujoco>')
+    row = limits(text, "Euler")["Euler"]
+    assert "jump" in row.starts and limits(hinge(), "Euler")["Euler"].starts == ""
+
+
+def test_what_creeps_is_told_by_the_law_of_a_soft_contact():
+    """Speed g_t (1 - d) / (d b impratio), b = 2 / (d timeconst), of one sticking contact under a pull."""
+    row = limits(sphere(impratio=3.0, pull=2.0, condim=3, x=""), "Euler")["Euler"]
+    d = 0.9
+    speed = 2.0 * (1.0 - d) / (d * 2.0 / (d * 0.02) * 3.0)
+    assert row.creep_rad_per_s == pytest.approx(speed, rel=0.02) and row.creeping_joint == "x"
+
+
+def test_distance_from_fine_steps_falls_with_the_step_and_with_the_order():
+    def apart(dt, integrator):
+        return limits(hinge(dt=dt), integrator)[integrator].apart
+
+    assert apart(0.008, "Euler") > 1.5 * apart(0.004, "Euler") > 2.0 * apart(0.002, "Euler") > 0.0
+    assert apart(0.004, "RK4") < 0.3 * apart(0.004, "Euler")
+
+
+def test_the_longest_step_within_an_error_is_shorter():
+    row = limits(hinge(), "Euler", error=1e-3)["Euler"]
+    assert 0.0 < row.within_error_s < row.stable_up_to_s and limits(hinge(), "Euler")["Euler"].within_error_s is None
+    assert limits(hinge(), "Euler", error=1e-12)["Euler"].within_error_s is None
