@@ -120,10 +120,10 @@ def step_limits(
     if controls is not None:
         from ..robots.scene_file import read_controls
 
-        names = [actuator.name for actuator in reading.drive.actuators]
+        names = reading.drive.names if reading.drive else ()
         is_path = isinstance(controls, str | PathLike)
         recorded = (
-            read_controls(str(controls), names)
+            read_controls(str(controls), names, reading.dt)
             if is_path
             else {name: np.asarray(values, float) for name, values in cast(Any, controls).items()}
         )

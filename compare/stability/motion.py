@@ -9,7 +9,7 @@ import numpy as np
 from ..engines.mujoco.changes import Program, program
 from ..engines.mujoco.names import control_of, element_name, number_of_actuators
 from ..engines.mujoco.reading import Reading
-from ..engines.mujoco.stepper import Stepper, holding
+from ..engines.mujoco.stepper import Stepper
 from ..robots.coordinates import Coordinates
 from ..robots.file import names_of_keys
 
@@ -113,7 +113,7 @@ def motion_of(
     stepper.put(state)
     mujoco.mj_fwdPosition(stepper.model, stepper.data)
     lengths = stepper.data.actuator_length.copy()
-    holds = any(holding(model, i, 0.0) is not None for i in range(moves))
+    holds = reading.drive is not None and reading.drive.feeds_back
     controls = "keyframe" if posture.key and model.key_ctrl.any() else "servos" if holds else ""
     if recorded:
         columns = np.tile(state[place], (len(recorded["time"]), 1))

@@ -51,7 +51,9 @@ def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
         assert on_floor.stable_up_to_s < 1.03 * linear_limit(leg(integrator), integrator)
 
 
-@pytest.mark.parametrize("text", [hinge(), hinge('<position joint="turn" kp="300" kv="2"/>', joint='damping="0.3"'), leg(), sphere()])
+@pytest.mark.parametrize("text", [
+    hinge(), hinge('<position joint="turn" kp="300" kv="2"/>', joint='damping="0.3"'), leg(), sphere(),
+])  # fmt: skip
 def test_plain_runs_with_other_signs_hold_below_and_fail_above(text):
     for row in limits(text, "Euler", "RK4")[: 1 if "size=\"0.1\" mass=\"2\"" in text else 2]:
         rest = row.creep_rad_per_s + max(0.01, row.push_rad_per_s / 2.0)
@@ -125,7 +127,7 @@ def test_weak_growth_is_seen_in_a_longer_run():
 
 def test_a_push_that_is_stated_is_not_lowered():
     spring = UPRIGHT.format('stiffness="3" damping="0.3"', "")  # rests upright, falls beyond a small push
-    assert 0.0 < limits(spring, "Euler")["Euler"].survived_rad_per_s
+    assert limits(spring, "Euler")["Euler"].survived_rad_per_s > 0.0
     row = limits(UPRIGHT.format("", ""), "Euler", push=0.5)["Euler"]
     assert row.judged_by == "falls" and row.push_rad_per_s == 0.5 and row.stable_up_to_s is None
     assert "not judged" in str(limits(UPRIGHT.format("", ""), "Euler", push=0.5))
@@ -144,7 +146,8 @@ def test_a_keyframe_with_speeds_is_judged_joint_by_joint():
 
 
 def test_an_equality_that_does_not_hold_at_the_start_is_told():
-    text = hinge().replace("</worldbody>", '<body name="b"><joint name="other" axis="0 0 1"/><geom size="0.1"/></body></worldbody>')
+    other = '<body name="b"><joint name="other" axis="0 0 1"/><geom size="0.1"/></body></worldbody>'
+    text = hinge().replace("</worldbody>", other)
     text = text.replace("</mujoco>", '<equality><joint joint1="turn" joint2="other" polycoef="0.8 1 0 0 0"/></equality></mujoco>')
     row = limits(text, "Euler")["Euler"]
     assert "jump" in row.starts and limits(hinge(), "Euler")["Euler"].starts == ""
