@@ -109,10 +109,10 @@ OPTIONS = {
     "--kp": Option(number("gain", 0.0, HIGHEST_GAIN), "KP"),
     "--kv": Option(number("gain", 0.0, HIGHEST_GAIN), "KV"),
     "--push": Option(number("push in rad/s or m/s", 1e-9, 1e3), "P"),
-    "--error": Option(number("error", 1e-12, 1.0), "E", example=f"{ROBOT} --error 0.001 --write small.xml"),
+    "--error": Option(number("error", 1e-12, 1.0), "E", example=f"{ROBOT} --error 0.001"),
     "--points": Option(metavar="NAMES"),
     "--controls": Option(metavar="CSV", example=f"{ROBOT} --controls recorded.csv"),
-    "--write": Option(metavar="FILE"),
+    "--write": Option(metavar="FILE", example=f"{ROBOT} --write small.xml"),
 }
 
 

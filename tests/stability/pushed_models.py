@@ -29,7 +29,14 @@ LIMIT = (-KV + (KV**2 + 4.0 * INERTIA * KP) ** 0.5) / KP  # s, of Euler with thi
 
 
 def hinge(actuator=SERVO, dt=0.002, integrator="Euler", joint="", option="", keys=""):
-    values = {"actuator": actuator, "dt": dt, "integrator": integrator, "joint": joint, "option": option, "keys": keys}
+    values = {
+        "actuator": actuator,
+        "dt": dt,
+        "integrator": integrator,
+        "joint": joint,
+        "option": option,
+        "keys": keys,
+    }
     return HINGE.format(**values)
 
 

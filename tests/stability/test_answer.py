@@ -40,27 +40,41 @@ def diverges(text, steps, kp, kv, delay=0):
 @pytest.mark.parametrize("delay", [0.0, 0.004])
 def test_the_longest_period_of_a_program_is_that_of_a_plain_loop(delay):
     text = hinge(MOTOR)
-    row = compare.step_limits(text, integrators=["Euler"], control_period=0.01, delay=delay, kp=KP, kv=KV)["Euler"]
+    row = compare.step_limits(text, integrators=["Euler"], control_period=0.01, delay=delay, kp=KP, kv=KV)[
+        "Euler"
+    ]
     steps, late = [round(time / 0.002) for time in (row.stable_up_to_s, row.fails_at_s)], round(delay / 0.002)
-    assert not diverges(text, steps[0], KP, KV, late) and diverges(text, steps[1], KP, KV, late) and row.of == "period"
+    assert (
+        not diverges(text, steps[0], KP, KV, late)
+        and diverges(text, steps[1], KP, KV, late)
+        and row.of == "period"
+    )
 
 
 def test_the_files_servos_in_a_program_are_the_same_law():
     of_file = compare.step_limits(hinge(), integrators=["Euler"], control_period=0.01)["Euler"]
-    of_motor = compare.step_limits(hinge(MOTOR), integrators=["Euler"], control_period=0.01, kp=KP, kv=KV)["Euler"]
+    of_motor = compare.step_limits(hinge(MOTOR), integrators=["Euler"], control_period=0.01, kp=KP, kv=KV)[
+        "Euler"
+    ]
     assert of_file.stable_up_to_s == of_motor.stable_up_to_s and of_file.controls == "program"
 
 
 def test_a_damper_is_a_program_and_the_limit_of_its_period_is_two_over_its_rate():
-    row = compare.step_limits(hinge(MOTOR), integrators=["Euler"], control_period=0.01, kp=0.0, kv=5.0)["Euler"]
+    row = compare.step_limits(hinge(MOTOR), integrators=["Euler"], control_period=0.01, kp=0.0, kv=5.0)[
+        "Euler"
+    ]
     assert row.stable_up_to_s <= 2.0 * INERTIA / 5.0 <= row.fails_at_s
 
 
 def test_where_no_period_or_every_one_is_stable_that_is_said():
-    none = compare.step_limits(hinge(MOTOR), control_period=0.01, delay=0.3, kp=400.0, kv=0.1, integrators=["Euler"])
+    none = compare.step_limits(
+        hinge(MOTOR), control_period=0.01, delay=0.3, kp=400.0, kv=0.1, integrators=["Euler"]
+    )
     assert none["Euler"].stable_up_to_s is None and none["Euler"].stable_at_file_dt is False
     every = compare.step_limits(hinge(MOTOR), control_period=0.01, kp=0.0, kv=1e-3, integrators=["Euler"])
-    assert every["Euler"].fails_at_s is None and every["Euler"].stable_at_file_dt and "over 500 ms" in str(every)
+    assert (
+        every["Euler"].fails_at_s is None and every["Euler"].stable_at_file_dt and "over 500 ms" in str(every)
+    )
 
 
 def test_a_program_needs_an_actuator():
@@ -74,7 +88,9 @@ def test_the_seventh_keyframe_is_a_posture_and_so_are_numbers():
     keys = "".join(f'<key name="k{i}" qpos="{i / 10}"/>' for i in range(9))
     reading = read(hinge(keys=keys))
     assert [posture.name for posture in postures_of(reading)] == [f"k{i}" for i in range(9)]
-    assert posture_of("k8", reading).key == "k8" and posture_of("90", reading).q == (pytest.approx(np.pi / 2),)
+    assert posture_of("k8", reading).key == "k8" and posture_of("90", reading).q == (
+        pytest.approx(np.pi / 2),
+    )
     assert compare.step_limits(hinge(keys=keys), posture="k7", integrators=["Euler"])[0].posture == "k7"
     with pytest.raises(ValueError, match="k8, qpos0, or 1 numbers"):
         posture_of("k9", reading)
@@ -117,7 +133,7 @@ def test_speed_gains_of_every_kind_of_servo_are_reduced(actuator):
 
 def test_more_iterations_are_tried_with_the_time_of_a_step():
     boxes = "".join(
-        f'<body pos="0 0 {0.11 + 0.2 * k}"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="{4 ** k}"/></body>'
+        f'<body pos="0 0 {0.11 + 0.2 * k}"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="{4**k}"/></body>'
         for k in range(3)
     )
     option = '<option timestep="0.004" iterations="1" ls_iterations="1" solver="{}"/>'
@@ -135,7 +151,11 @@ def test_what_stops_a_creep_is_tried():
     found, pyramidal = asked(text), asked(text.replace('cone="elliptic"', ""))
     stops = {stop.change: stop.speed for stop in found.stops}
     assert stops["impratio"] == pytest.approx(found.own.creep_rad_per_s * 3.0 / 100.0, rel=0.05)
-    assert pyramidal.own.creep_rad_per_s > 1e-4 and pyramidal.stops[0].change == "noslip" and pyramidal.stops[0].speed < 1e-6
+    assert (
+        pyramidal.own.creep_rad_per_s > 1e-4
+        and pyramidal.stops[0].change == "noslip"
+        and pyramidal.stops[0].speed < 1e-6
+    )
     assert not asked(hinge()).stops
 
 
@@ -147,11 +167,17 @@ def test_a_smaller_push_after_which_the_step_is_longer_is_told():
 
 def test_the_object_is_a_table_a_sequence_and_a_frame():
     found = compare.step_limits(hinge(), integrators=["implicitfast", "Euler"])
-    assert found["Euler"] is found[1] and [row.integrator for row in found] == ["implicitfast", "Euler"] and len(found) == 2
+    assert (
+        found["Euler"] is found[1]
+        and [row.integrator for row in found] == ["implicitfast", "Euler"]
+        and len(found) == 2
+    )
     lines = str(found).splitlines()
     assert any(line.split()[:3] == ["Euler", "18", "ms"] for line in lines) and "0.1 rad/s" in lines[-1]
     frame = found.to_frame()
-    assert frame.loc[1, "stable_up_to_s"] == found["Euler"].stable_up_to_s and np.isnan(frame.loc[0, "fails_at_s"])
+    assert frame.loc[1, "stable_up_to_s"] == found["Euler"].stable_up_to_s and np.isnan(
+        frame.loc[0, "fails_at_s"]
+    )
     with pytest.raises(KeyError, match="was not asked"):
         found["RK4"]
 

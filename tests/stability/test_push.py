@@ -29,7 +29,9 @@ def limits(text, *integrators, **more):
 def test_a_servo_of_one_hinge_has_the_limit_of_its_two_by_two_step():
     row = limits(hinge(), "Euler")["Euler"]
     assert row.stable_up_to_s < LIMIT < row.fails_at_s * 1.02 and row.stable_up_to_s > 0.9 * LIMIT
-    assert row.fails_at_s / row.stable_up_to_s < 1.061 and row.moves_first == "turn" and row.judged_by == "rest"
+    assert (
+        row.fails_at_s / row.stable_up_to_s < 1.061 and row.moves_first == "turn" and row.judged_by == "rest"
+    )
     assert limits(hinge(), "implicitfast")["implicitfast"].fails_at_s is None
 
 
@@ -55,11 +57,15 @@ def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
     hinge(), hinge('<position joint="turn" kp="300" kv="2"/>', joint='damping="0.3"'), leg(), sphere(),
 ])  # fmt: skip
 def test_plain_runs_with_other_signs_hold_below_and_fail_above(text):
-    for row in limits(text, "Euler", "RK4")[: 1 if "size=\"0.1\" mass=\"2\"" in text else 2]:
+    for row in limits(text, "Euler", "RK4")[: 1 if 'size="0.1" mass="2"' in text else 2]:
         rest = row.creep_rad_per_s + max(0.01, row.push_rad_per_s / 2.0)
         steps = [(0.94 * (row.stable_up_to_s or 0.0), True), (1.08 * (row.fails_at_s or 0.0), False)]
         for dt, holds in steps:
-            ends = [end_speed(text, dt, row.integrator, row.push_rad_per_s, seed) for seed in range(3)] if dt else []
+            ends = (
+                [end_speed(text, dt, row.integrator, row.push_rad_per_s, seed) for seed in range(3)]
+                if dt
+                else []
+            )
             assert not ends or all(speed <= rest for speed in ends) is holds
 
 
@@ -77,7 +83,9 @@ def test_the_solvers_iterations_are_part_of_the_file():
         f'{FLOOR}<body pos="0 0 0.2"><freejoint/><geom type="box" size="0.2 0.1 0.05" mass="3"/>'
         + "".join(
             f'<body pos="{x} {y} 0"><joint axis="0 1 0" damping="0.5" frictionloss="0.1" armature="0.01"/>'
-            '<geom size="0.03" pos="0 0 -0.17" mass="0.2"/></body>' for x in (-0.2, 0.2) for y in (-0.1, 0.1)
+            '<geom size="0.03" pos="0 0 -0.17" mass="0.2"/></body>'
+            for x in (-0.2, 0.2)
+            for y in (-0.1, 0.1)
         )
         + "</body></worldbody></mujoco>"
     )
@@ -85,12 +93,19 @@ def test_the_solvers_iterations_are_part_of_the_file():
     model.opt.disableflags = 0
     few = limits(model, "Euler", "implicitfast")
     model.opt.iterations = model.opt.ls_iterations = 100
-    assert few[0].longest_s < limits(model, "Euler", "implicitfast")[0].longest_s or few[1].longest_s <= few[0].longest_s
+    assert (
+        few[0].longest_s < limits(model, "Euler", "implicitfast")[0].longest_s
+        or few[1].longest_s <= few[0].longest_s
+    )
 
 
 def test_what_moves_on_by_itself_is_judged_by_divergence_alone():
     falling = limits(UPRIGHT.format("", ""), "Euler")["Euler"]
-    assert falling.judged_by == "divergence" and falling.by_itself == "rests" and falling.survived_rad_per_s == 0.0
+    assert (
+        falling.judged_by == "divergence"
+        and falling.by_itself == "rests"
+        and falling.survived_rad_per_s == 0.0
+    )
     tilted = UPRIGHT.format('damping="0.01"', '<keyframe><key name="tilted" qpos="0.3"/></keyframe>')
     row = limits(tilted, "Euler")["Euler"]
     assert row.by_itself == "moves on" and row.stable_at_file_dt and row.unpushed_rad_per_s > 0.05
@@ -100,7 +115,11 @@ def test_what_moves_on_by_itself_is_judged_by_divergence_alone():
 
 
 def test_what_diverges_while_it_falls_is_told():
-    text = UPRIGHT.format("", "").replace('damping=""', "").replace("<geom", '<joint name="tail" axis="1 0 0"/><geom')
+    text = (
+        UPRIGHT.format("", "")
+        .replace('damping=""', "")
+        .replace("<geom", '<joint name="tail" axis="1 0 0"/><geom')
+    )
     servo = '<actuator><position joint="tail" kp="2000" kv="200"/></actuator></mujoco>'
     row = limits(text.replace("</mujoco>", servo), "Euler")["Euler"]
     assert row.judged_by == "divergence" and not row.stable_at_file_dt and row.outcome == "diverges"
@@ -148,7 +167,10 @@ def test_a_keyframe_with_speeds_is_judged_joint_by_joint():
 def test_an_equality_that_does_not_hold_at_the_start_is_told():
     other = '<body name="b"><joint name="other" axis="0 0 1"/><geom size="0.1"/></body></worldbody>'
     text = hinge().replace("</worldbody>", other)
-    text = text.replace("</mujoco>", '<equality><joint joint1="turn" joint2="other" polycoef="0.8 1 0 0 0"/></equality></mujoco>')
+    text = text.replace(
+        "</mujoco>",
+        '<equality><joint joint1="turn" joint2="other" polycoef="0.8 1 0 0 0"/></equality></mujoco>',
+    )
     row = limits(text, "Euler")["Euler"]
     assert "jump" in row.starts and limits(hinge(), "Euler")["Euler"].starts == ""
 
@@ -171,5 +193,8 @@ def test_distance_from_fine_steps_falls_with_the_step_and_with_the_order():
 
 def test_the_longest_step_within_an_error_is_shorter():
     row = limits(hinge(), "Euler", error=1e-3)["Euler"]
-    assert 0.0 < row.within_error_s < row.stable_up_to_s and limits(hinge(), "Euler")["Euler"].within_error_s is None
+    assert (
+        0.0 < row.within_error_s < row.stable_up_to_s
+        and limits(hinge(), "Euler")["Euler"].within_error_s is None
+    )
     assert limits(hinge(), "Euler", error=1e-12)["Euler"].within_error_s is None

@@ -301,3 +301,14 @@ def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
     for row, start, end in zip(moved, starts, ends):
         mujoco.mj_differentiatePos(m, row, 1.0, start, end)
     return moved.reshape(*pairs[0].shape[:-1], m.nv)
+
+
+def touching(stepper: Stepper, state: Array, by: Array) -> set[str]:
+    """The pairs of geoms whose contacts have forces at a moved state, and how many contacts each has."""
+    m, d = stepper.model, stepper.put(state)
+    mujoco.mj_integratePos(m, d.qpos, by[: m.nv], 1.0)
+    d.qvel += by[m.nv : 2 * m.nv]
+    mujoco.mj_forward(m, d)
+    pairs = [tuple(pair) for pair in d.contact.geom[d.contact.efc_address >= 0].tolist()]
+    names = [" and ".join(element_name(m, "geom", geom) for geom in pair) for pair in pairs]
+    return {f"{name} ({pairs.count(pair)})" for pair, name in zip(pairs, names)}

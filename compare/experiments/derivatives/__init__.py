@@ -5,7 +5,6 @@ from functools import partial
 from itertools import pairwise
 from typing import Any, cast
 
-import mujoco
 import numpy as np
 
 from tmt.compiled.evaluator import Evaluator
@@ -16,9 +15,8 @@ from ...engines import LABELS
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.engine import methods_for
 from ...engines.mujoco.names import INTEGRATORS as MEMBERS
-from ...engines.mujoco.names import element_name
 from ...engines.mujoco.reading import Reading
-from ...engines.mujoco.stepper import Stepper
+from ...engines.mujoco.stepper import Stepper, touching
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...stability.motion import postures_of
@@ -139,17 +137,6 @@ def contact_rows(reading: Reading) -> list[ContactRow]:
             difference=error if np.isfinite(error) else None, changed="; ".join(sorted(changed)),
         ))  # fmt: skip
     return rows
-
-
-def touching(stepper: Stepper, state: np.ndarray, by: np.ndarray) -> set[str]:
-    """The pairs of geoms whose contacts have forces at a moved state, and how many contacts each has."""
-    m, d = stepper.model, stepper.put(state)
-    mujoco.mj_integratePos(m, d.qpos, by[: m.nv], 1.0)
-    d.qvel += by[m.nv : 2 * m.nv]
-    mujoco.mj_forward(m, d)
-    pairs = [tuple(pair) for pair in d.contact.geom[d.contact.efc_address >= 0].tolist()]
-    names = [" and ".join(element_name(m, "geom", geom) for geom in pair) for pair in pairs]
-    return {f"{name} ({pairs.count(pair)})" for pair, name in zip(pairs, names)}
 
 
 def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: Sequence[Measured]) -> None:

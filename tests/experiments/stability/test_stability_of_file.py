@@ -31,7 +31,13 @@ def said(result, kind):
 
 
 def row(up_to=0.01, fails=0.0106, stable=True, posture="p", **more):
-    usual = {"judged_by": "rest", "outcome": "holds", "by_itself": "rests", "unit": "rad/s", "survived_rad_per_s": 0.1}
+    usual = {
+        "judged_by": "rest",
+        "outcome": "holds",
+        "by_itself": "rests",
+        "unit": "rad/s",
+        "survived_rad_per_s": 0.1,
+    }
     return StepLimitRow(
         posture=posture, integrator="Euler", push_rad_per_s=0.1, stable_up_to_s=up_to, fails_at_s=fails,
         stable_at_file_dt=stable, file_dt_s=0.002, file_integrator="Euler", moves_first="knee", run_s=3.0, fine_dt_s=2.5e-4,
@@ -71,16 +77,22 @@ def test_the_posture_that_is_asked_for_is_the_start():
 def test_a_step_that_fails_is_said_with_what_helps():
     result = found_of(dt=1.4 * LIMIT, size=Setup.small)
     (answer,) = said(result, "answer")
-    assert answer.startswith("Not stable") and "home" in answer and "(turn)" in answer and "19 ms" not in answer
+    assert (
+        answer.startswith("Not stable") and "home" in answer and "(turn)" in answer and "19 ms" not in answer
+    )
     (helps,) = said(result, "remedies")
     assert "implicitfast" in helps and "kv" in helps and "armature" in helps
-    assert not said(found_of(), "remedies") and said(found_of(), "answer")[0].startswith("Stable: 2 ms with Euler")
+    assert not said(found_of(), "remedies") and said(found_of(), "answer")[0].startswith(
+        "Stable: 2 ms with Euler"
+    )
 
 
 def test_the_table_of_a_run_alone_has_a_line_for_each_integrator_and_few_lines_in_all():
     result = found_of(size=Setup.small, alone=True)
     lines = [line for text in result.top for line in screen(text)]
-    assert len(lines) <= 12 and [line.split()[0] for line in lines if line.startswith(" ")][1:] == list(INTEGRATORS)
+    assert len(lines) <= 12 and [line.split()[0] for line in lines if line.startswith(" ")][1:] == list(
+        INTEGRATORS
+    )
 
 
 @pytest.mark.parametrize("more, words", [
@@ -108,7 +120,9 @@ def test_what_the_robot_does_by_itself_is_said(result, by_itself, words):
     (None, None, None, None),
 ])  # fmt: skip
 def test_a_check_of_each_posture(result, up_to, fails, stable, passes):
-    of_file.check(result, row(up_to, fails, stable, judged_by="rest" if stable is not None else ""), AT_OWN_STEP)
+    of_file.check(
+        result, row(up_to, fails, stable, judged_by="rest" if stable is not None else ""), AT_OWN_STEP
+    )
     (check,) = result.checks
     assert (check.passed if check.judged else None) is passes
 
