@@ -1,7 +1,7 @@
 """For tests of whole runs: the command line without its further processes, which take 2.5 s to start; small runs of the arm."""
 
 from concurrent.futures import Future
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import cache
 
 import pytest
@@ -39,7 +39,7 @@ class InProcess:
 @contextmanager
 def without_workers():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "start_workers", contextmanager(lambda: iter([InProcess()])))
+        patch.setattr(command, "start_workers", lambda: nullcontext(InProcess()))
         yield
 
 

@@ -1,10 +1,9 @@
-"""A report as one document in two media: report.md, which is short, and index.html, which folds what is long.
-
-Both are rendered from document.md.jinja; here is chosen how much of each part is shown.
-"""
+"""A report as one document in Markdown: report.md, and index.html, which is made from it, with its figures inside."""
 
 import re
 from collections.abc import Sequence
+from functools import partial
+from html import unescape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,11 +21,10 @@ from .images import embedded
 from .questions import answers
 from .verdict import Figure, Report, Section, failures, headline, outcome, standing
 
-MOST_ROWS, MOST_IN_MARKDOWN = 40, 6  # of a table; its file has all
+MOST_ROWS = 8  # of a table; its file has all
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
-# further tables of report.md, with their titles; columns of failing checks
-MAIN_TABLES = {"what_should_i_use": "What should I use?", "engines_answer": "Which engine?"}
+TITLES = {"what_should_i_use": "What should I use?", "engines_answer": "Which engine?"}  # of tables
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
 
@@ -49,23 +47,19 @@ class Listing(NamedTuple):
 
 
 class Document:
-    """One report in one medium. folder: where its figures are, for a page; None: report.md."""
-
-    def __init__(self, report: Report, folder: Path | None = None):
-        self.report, self.page = report, folder is not None
-        data: dict[str, Any] = {"page": self.page, "embedded": embedded}
-        data |= {"outcome": outcome, "standing": standing, "headline": headline}
-        data["drawn"] = folder / "figures" if folder else None
+    def __init__(self, report: Report):
+        self.report, robot = report, report.robot
+        values = {"outcome": outcome, "standing": standing, "headline": headline}
         # its attributes are the macros
-        self.template: Any = environment().get_template("document.md.jinja").make_module(data)
-        self.answers = answers(report.sections, report.robot)
+        self.template: Any = environment().get_template("document.md.jinja").make_module(values)
+        self.answers = answers(report.sections, robot)
+        self.title = block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
 
     def text(self) -> str:
         """The whole document."""
-        report, robot = self.report, self.report.robot
+        report = self.report
         lines = report.verdict.split("\n")
-        title = block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
-        parts = [self.template.head(title, report.first_lines, lines, report.top, report.passed)]
+        parts = [self.template.head(self.title, report.first_lines, lines, report.top, report.passed)]
         parts += [self.first_screen(), self.introduction()]
         if report.causes:
             parts.append(self.template.causes(tables.of_causes(report.causes)))
@@ -74,18 +68,16 @@ class Document:
         parts += map(self.section, report.sections)
         parts.append(self.template.skipped(report.skipped) if report.skipped else "")
         parts.append(self.template.provenance(tables.of_origin(report.origin)))
-        text = joined(parts)
-        if not self.page:
-            return text
-        return page_of(title, text, report.passed, self.links())
+        return joined(parts)
 
-    def links(self) -> list[tuple[str, bool]]:
-        names = [("questions", False)] if self.answers is not None else []
-        names += [(section.name, standing(section)[0] is False) for section in self.report.sections]
-        return [*names, ("provenance", False)]
+    def page(self, folder: Path) -> str:
+        """The document as a page; folder: that of the report, with its figures."""
+        links = [("questions", False)] if self.answers is not None else []
+        links += [(section.name, standing(section)[0] is False) for section in self.report.sections]
+        return page_of(self.title, self.text(), self.report.passed, [*links, ("provenance", False)], folder)
 
     def first_screen(self) -> str:
-        """A line for each experiment, the pictures; on the page also what explains that checks fail."""
+        """A line for each experiment, the pictures, and what explains that checks fail."""
         report = self.report
         failed = [check for kind in failures(report.sections) for check in kind]
         failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
@@ -104,12 +96,9 @@ class Document:
             fails = any(other in wrong for other in group)
             for figure in section.figures:
                 if figure.is_overview:
-                    title, alternative = (
-                        block(section.name, f"overview_{x}") for x in ("title", "alternative")
-                    )
+                    texts = (block(section.name, f"overview_{x}") for x in ("title", "alternative"))
+                    title, alternative = (" ".join(text.split()) for text in texts)
                     pictures.append(Picture(figure, section.name, title, alternative, fails))
-        if not self.page:
-            return pictures
         failing = [(section, figure) for section in wrong for figure in section.own_figures]
         if failing and not any(picture.fails for picture in pictures):
             section, figure = failing[0]
@@ -123,32 +112,43 @@ class Document:
         return " ".join(text.split())
 
     def section(self, section: Section) -> str:
-        checks, few = section.result.checks, MOST_ROWS if self.page else MOST_IN_MARKDOWN
-        not_judged = [check for check in checks if not check.judged]
+        not_judged = [check for check in section.result.checks if not check.judged]
         figures = section.own_figures
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [figure for figure in figures if figure in first or figure.moves]
-        lists = {"failing": listing(section.failed, few), "not_judged": listing(not_judged, few)}
+        found = {"Failing checks": section.failed, "Not judged": not_judged}
+        lists = {label: listing(checks, MOST_ROWS) for label, checks in found.items()}
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
         return self.template.section(section, lists, of_section, first, folded)
 
     def table(self, section: Section, name: str, rows: Sequence[Row]) -> Listing:
         """A table with the rows that a reader needs; its rows are None where only its file has them."""
-        title = MAIN_TABLES.get(name, capital(name.replace("_", " ")))
+        title = TITLES.get(name, capital(name.replace("_", " ")))
         columns = section.result.shown if name == section.name else None
-        is_main = self.page or name == section.name or name in MAIN_TABLES
-        if columns == [] or name in section.result.filed or not is_main:
+        if columns == [] or name in section.result.filed:
             return Listing(len(rows), None, name, title)
-        few = rows[: MOST_ROWS if self.page else MOST_IN_MARKDOWN]
-        return Listing(len(rows), tables.of_rows(few, columns), name, title)
+        return Listing(len(rows), tables.of_rows(rows[:MOST_ROWS], columns), name, title)
 
 
-def page_of(title: str, text: str, good: bool, links: Sequence[tuple[str, bool]] = ()) -> str:
-    """A document in Markdown as a page. links: its sections, and whether something fails there."""
-    html = Markup(MarkdownIt("commonmark", {"html": True}).enable("table").render(text))
-    values = {"title": title, "good": good, "links": links, "body": html}
+def page_of(
+    title: str, text: str, good: bool, links: Sequence[tuple[str, bool]] = (), folder: Path | None = None
+) -> str:
+    """A document in Markdown as a page.
+
+    links: its sections, and whether something fails there; folder: where its figures are, which the page has inside.
+    """
+    html = MarkdownIt("commonmark", {"html": True}).enable("table").render(text)
+    if folder:
+        html = re.sub(r'(?<=<img )(alt="[^"]*" )src="(figures/[^"]+)"', partial(inside, folder), html)
+    values = {"title": title, "good": good, "links": links, "body": Markup(html)}
     return environment().get_template("page.html.jinja").render(values)
+
+
+def inside(folder: Path, image: re.Match[str]) -> str:
+    """The attributes of a figure with its data."""
+    data, width, height = embedded(folder / unescape(image[2]))
+    return f'{image[1]}width="{width}" height="{height}" src="{data}"'
 
 
 def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:

@@ -23,8 +23,9 @@ def write(folder: Path, report: Report) -> None:
     for section in report.sections:
         for name, rows in section.tables.items():
             save(folder / "tables" / f"{name}.csv", csv(rows))
-    save(folder / "report.md", Document(report).text())
-    save(folder / "index.html", Document(report, folder).text())
+    document = Document(report)
+    save(folder / "report.md", document.text())
+    save(folder / "index.html", document.page(folder))
     results = {
         "passed": report.passed,
         "reference": report.reference,

@@ -17,6 +17,7 @@ from compare.report.files import write
 from compare.report.verdict import OVERVIEW, Report, verdict
 from compare.robots.arm import ARM
 
+ROW = '<span class="mark {}" aria-hidden="true">✓</span></td>\n<td><a href="#{}">'
 CAUSE = Cause(rank=2, place="mass of forearm", stated=1.5, explains=1.6, text="forearm: 1.6 kg")
 
 
@@ -36,8 +37,8 @@ def report_of(folder, sections, causes=(), skipped=(), robot=ARM):
 
 def page_of(folder, sections, causes=(), skipped=()):
     """The first screen of a page of these sections, and what comes below it."""
-    document = Document(report_of(folder, sections, causes, skipped), folder)
-    top, mark, rest = document.text().partition("<section")
+    page = Document(report_of(folder, sections, causes, skipped)).page(folder)
+    top, mark, rest = page.partition("<section")
     return top, mark + rest
 
 
@@ -51,8 +52,8 @@ def test_the_verdict_a_line_for_each_experiment_and_the_pictures_come_before_all
     assert places == sorted(places)
     assert 'class="causes"' not in top and '<main id="main" class="good">' in top
     for name in figures:
-        assert re.search(rf'<li class="good">.*?<a href="#{name}">', top) and f'<section id="{name}"' in rest
-    assert '<li class="skipped">' in top and "&lt;too slow&gt;" in top
+        assert ROW.format("good", name) in top and f'<section id="{name}"' in rest
+    assert "<td>skipped</td>\n<td>&lt;too slow&gt;</td>" in top
     pictures = re.findall(r'<figure class="good"><a href="#([^"]+)"><img alt="[^"]+"', top)
     assert pictures == ["acceleration", "trajectory"]
 
@@ -63,18 +64,20 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
         section("trajectory", GOOD, BAD, figures=[f"{OVERVIEW}scenes"]), section("speed"),
     ]  # fmt: skip
     top, rest = page_of(folder, sections, causes=[CAUSE])
-    assert re.search(r"<td>mass of forearm</td><td>1\.5</td><td>1\.6</td>", top)
+    assert re.search(r"<td>mass of forearm</td>\s<td>1\.5</td>\s<td>1\.6</td>", top)
     assert 'class="verdict bad"' in top and '<main id="main" class="bad">' in top
     assert re.findall(r'<figure class="(\w+)"><a href="#([^"]+)"', top) == [
         ("bad", "trajectory"), ("good", "acceleration"),
     ]  # fmt: skip
     for name, kind in (("mass", "good"), ("trajectory", "bad"), ("speed", "none")):
-        assert re.search(f'<li class="{kind}">[^\n]*?<a href="#{name}">', top)
+        assert {"good": "✓", "bad": "✗", "none": "–"}[kind] == re.search(
+            rf'<span class="mark {kind}" aria-hidden="true">(.)</span></td>\n<td><a href="#{name}">', top
+        )[1]
         assert f'<p class="outcome {kind}">' in rest
     top, rest = page_of(folder, [section("kinematics", *[BAD] * 5, figures=["kinematics_distances"])])
-    assert rest.count("<tr><td>kinematics</td><td>zero</td><td>Mbar</td>") == 5
-    assert '<div class="pictures"><figure class="bad"><a href="#kinematics">' in top
-    assert top.count("<td>kinematics</td><td>zero</td><td>Mbar</td><td>2</td><td>1</td>") == 4
+    failing = "<tr>\n<td>kinematics</td>\n<td>zero</td>\n<td>Mbar</td>\n<td>2</td>\n<td>1</td>"
+    assert (top.count(failing), rest.count(failing)) == (4, 5)
+    assert '<div class="pictures">\n<figure class="bad"><a href="#kinematics">' in top
 
 
 BROKEN = "runs to its end", None, 0.0, "equal", False, About.PROGRAM
@@ -86,12 +89,14 @@ def test_what_broke_off_or_was_not_judged_is_on_the_first_screen_and_in_its_sect
     sections = [section("mass", GOOD), open_section, section("speed", GOOD, BROKEN), section("trajectory", BAD)]
     for one, what in zip(sections, (None, "torque", "runs to its end", "Mbar")):
         top, rest = page_of(folder, [one])
-        text = Document(report_of(folder, [one])).text()
-        assert re.findall(rf"<td>{one.name}</td><td>\w*</td><td>([^<]*)</td>", top) == [what] * (what is not None)
+        text = Document(report_of(folder, [one])).text().partition("<section")[2]
+        first = re.findall(rf"<td>{one.name}</td>\s<td>\w*</td>\s<td>([^<]*)</td>", top)
+        assert first == [what] * (what is not None)
         assert [f"{label}:**" in rest for label in ("Failing checks", "Not judged")] == [False, False]  # no markup is left
         labels = [f"<strong>{label}:</strong>" in rest for label in ("Failing checks", "Not judged")]
         assert labels == [what not in (None, "torque"), what == "torque"]
         assert labels == [f"**{label}:**" in text for label in ("Failing checks", "Not judged")]
+        assert ("<td>not judged</td>" in top) == (what == "torque")
         assert ("nothing moves" in rest) == ("nothing moves" in text) == (what == "torque")
     page = "".join(page_of(folder, sections))
     links = re.findall(r'<a href="#(\w+)">(<span class="mark bad"[^<]*✗</span>)?(?:\w+)</a>', page.partition("<main")[0])
@@ -99,10 +104,17 @@ def test_what_broke_off_or_was_not_judged_is_on_the_first_screen_and_in_its_sect
     assert {name for name, mark in links if not mark} == {"main", "questions", "mass", "gravity", "provenance"}
 
 
+def test_what_was_interrupted_has_not_passed_whatever_its_checks_say(folder):
+    report = report_of(folder, [section("mass", GOOD)])
+    for is_complete, kind in ((True, "good"), (False, "bad")):
+        one = report._replace(is_complete=is_complete)
+        assert one.passed is is_complete and f'<main id="main" class="{kind}">' in Document(one).page(folder)
+
+
 @pytest.mark.parametrize("failing, said", [(0, "9 of 9"), (1, "8 of 9")])
 def test_the_number_of_an_experiment_counts_what_passes(failing, said, folder):
     top, _ = page_of(folder, [section("mass", *[GOOD] * (9 - failing), *[BAD] * failing)])
-    assert f"<small>{said} checks passed; largest share of a tolerance: 50 %</small>" in top
+    assert f"<td>{said} checks passed; largest share of a tolerance: 50 %</td>" in top
 
 
 def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
@@ -113,7 +125,7 @@ def test_a_section_folds_its_details_and_all_but_the_first_figures(folder):
     text = page_of(folder, [of])[1].partition('<section id="mass"')[2]
     fold = text.index("<details>")
     assert text.index("Note 4 &lt; 9.") < fold
-    assert "<table" not in text[:fold] and text.count("<tr><td>other</td>") == 40
+    assert "<table" not in text[:fold] and text.count("<td>other</td>") == 8
     assert '"tables/mass.csv">' in text and '"tables/extra.csv">' in text and "<td>1.5</td>" not in text
     above = [name for name in names if text.index(f'id="figure-{name}"') < fold]
     assert above == [*names[:2], names[-1]]
@@ -134,10 +146,10 @@ def test_results_have_every_check_cause_and_digit(folder):
     assert results["causes"] == [CAUSE.record()]
     lines = text_of(folder / "tables" / "mass.csv").splitlines()
     assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
-    assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]  # cut in the report
+    assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]
     html, text = (text_of(folder / name) for name in ("index.html", "report.md"))
-    assert names not in text and CAUSE.text in html and CAUSE.text in text
-    assert html.count("<td>0.123</td>") == 3
+    assert CAUSE.text in html and CAUSE.text in text
+    assert html.count("<td>0.123</td>") == text.count("| 0.123 |") == 3
     assert [path.name for path in (folder / "figures").iterdir()] == ["mass_distances.png"]
 
 
