@@ -144,3 +144,12 @@ def test_a_motion_of_one_unit_takes_the_steps_that_its_error_wants():
     fallen = [1.0 + (2.0 - 9.81) / 2.0, 1.0 + 2.0 - 9.81]
     assert np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - fallen).max() < 1e-14
     assert motion.evaluations == 3 * STAGES  # 1 / 8 s, then the rest in pieces of at most 6 / 8 s
+
+
+def test_errors_are_relative_to_the_larger_end_of_a_step():
+    """A spring that pulls a slide from 0 to 2000 m: SciPy takes the larger of both too."""
+    tree = one_body([(1, 0, 0)], ["slide"], stiffness=[100.0], rest=[1000.0], gravity=(0.0, 0.0, 0.0))
+    motion = tmt.simulate([0.0], [0.0], [0.0], 0.3, 1, ADAPTIVE, tree, 1e-10)
+    _, evaluations = of_scipy(tree, np.zeros(1), np.zeros(1), np.zeros(1), 0.3, 1e-10)
+    assert abs(motion.q[-1, 0] - 1000.0 * (1.0 - np.cos(3.0))) < 1e-5
+    assert evaluations / 1.3 <= motion.evaluations <= 1.3 * evaluations

@@ -73,7 +73,17 @@ def test_derivatives_are_those_of_31_digits_entry_by_entry(name, rng):
                 assert (truth.part(k).distance(values) <= FACTOR * EPS * allowed).all()
 
 
-@pytest.mark.parametrize("make", [kinds, small_tree])
+def beside():
+    """A free body beside an arm of two hinges, damped, with springs: what implicitfast takes of each is not the same."""
+    rng = np.random.default_rng(5)
+    tree = tree_of_kinds(rng, bodies=3, kinds=("hinge", "free"), most=1)
+    n = len(tree.kind)
+    return dataclasses.replace(
+        tree, parent=(-1, 0, 1, 2, -1, 4), body_joint=(3, 4, 5), stiffness=[0.0] * 4 + [2.0, 3.0][: n - 4]
+    )
+
+
+@pytest.mark.parametrize("make", [kinds, small_tree, beside])
 def test_derivatives_are_the_limits_of_differences(make, rng):
     """Of every kind of joint, with damping, springs, armature and gains of a controller."""
     tree = make()
@@ -92,9 +102,10 @@ def test_derivatives_are_the_limits_of_differences(make, rng):
         assert np.allclose(values, alone, rtol=1e-11, atol=1e-11)
 
 
+@pytest.mark.parametrize("make", [small_tree, beside])
 @pytest.mark.parametrize("method", tmt.METHODS)
-def test_a_and_b_are_the_limits_of_differences_of_a_step(method, rng):
-    tree, dt = small_tree(), 0.05
+def test_a_and_b_are_the_limits_of_differences_of_a_step(method, make, rng):
+    tree, dt = make(), 0.05
     (q,), (qd,), (tau,) = random_states(rng, tree, 1)
     A, B = tmt.step_derivatives(q, qd, tau, dt, method, tree)
     fixed = "dopri8" if method == "dopri8_adaptive" else method  # one step of that size
@@ -107,16 +118,18 @@ def test_a_and_b_are_the_limits_of_differences_of_a_step(method, rng):
     assert close(np.hstack([A, B]), differences(tree, after, q, qd, tau))
 
 
-@pytest.mark.parametrize("method", STRAIGHT)
-def test_a_compiled_step_has_the_derivatives_of_31_digits(method, rng):
-    q, qd, tau = random_states(rng, tmt.ARM, 2)
-    by, dt = tmt.derivatives(q, qd, tau), np.full((2, 1), 0.02)
-    entries = Entries(tmt.ARM, q, qd)
-    scale = entries.step(0.02, by, entries.derivatives(tau, tmt.acceleration(q, qd, tau), by))
+@pytest.mark.parametrize(
+    "method, tree", [*((method, tmt.ARM) for method in STRAIGHT), ("implicitfast", beside())]
+)
+def test_a_compiled_step_has_the_derivatives_of_31_digits(method, tree, rng):
+    q, qd, tau = random_states(rng, tree, 2)
+    by, dt = tmt.derivatives(q, qd, tau, tree), np.full((2, 1), 0.02)
+    entries = Entries(tree, q, qd)
+    scale = entries.step(0.02, by, entries.derivatives(tau, tmt.acceleration(q, qd, tau, tree), by))
     name = f"step_derivatives:{method}"
-    truth = exact_of_many(tmt.ARM, name, q, qd, tau, dt)
-    both = np.concatenate(tmt.step_derivatives(q, qd, tau, 0.02, method), axis=2)
-    for found in (both, Evaluator(tmt.ARM, name).of_any(q, qd, tau, dt)):
+    truth = exact_of_many(tree, name, q, qd, tau, dt)
+    both = np.concatenate(tmt.step_derivatives(q, qd, tau, 0.02, method, tree), axis=2)
+    for found in (both, Evaluator(tree, name).of_any(q, qd, tau, dt)):
         assert (truth.distance(found) <= FACTOR * EPS * scale).all()
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from many_digits import FIELDS, exact
-from trees import random_states, random_tree, tree_of_kinds
+from trees import one_body, random_states, random_tree, tree_of_kinds
 
 import tmt
 from tmt.derivation.quantities import PLAIN, QUANTITIES
@@ -198,3 +198,33 @@ def test_numbers_of_single_precision_end_where_floats_do():
     assert "3.3e+38f" in tmt.equations(inside, "c", ["mass_matrix"], single=True)
     with pytest.raises(ValueError, match="single precision"):
         tmt.equations(beyond, "c", ["mass_matrix"], single=True)
+
+
+def test_the_head_says_where_each_number_stands_and_what_parameters_are_in_the_model():
+    """Of a slide, a ball and a hinge, counted by hand; the numbers of a body in a frame that is turned by a quarter about z."""
+    tree = one_body(
+        [(0, 0, 1), *np.eye(3), (0, 1, 0)], ["slide", "ball", "hinge"], (0.3, 0.2, 0.1), np.diag([1.0, 2.0, 2.5]),
+        armature=[0.0] * 4 + [0.1],
+        site_names=["body"], site_joint=[2], site_offset=[(1.0, 2.0, 3.0)],
+        site_turn=[((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+    )  # fmt: skip
+    text = tmt.equations(
+        tree, "c header", ["bias"], name="thing", parameters=["body", "gravity"], head=["Said first."]
+    )
+    lines = [line.strip(" *") for line in text.splitlines()]
+    assert lines[0].strip("/* ") == "Said first." and "enum { thing_nq = 6, thing_nv = 5 };" in text
+    assert "nq = 6 numbers in q, nv = 5 in qd and tau, m = 1 bodies: body." in lines
+    assert lines[lines.index("a, slide, 0, 0; m, m/s, N") :][:3] == [
+        "a, slide, 0, 0; m, m/s, N", "b, ball, 1-4, 1-3; quaternion w x y z, rad/s in its own axes, N m",
+        "c, hinge, 5, 4; rad, rad/s, N m",
+    ]  # fmt: skip
+    found = dict(re.findall(r"(\w+): .*: \[(.*)\]", text))
+    numbers = {name: [float(x) for x in values.split(",")] for name, values in found.items()}
+    assert numbers["body_mass"] == [1.0] and numbers["gravity"] == [0.0, 0.0, -9.81]
+    assert np.allclose(
+        numbers["body_com"], (-1.8, 0.7, -2.9), atol=1e-15
+    )  # x of the frame is y of the joint's
+    assert np.allclose(numbers["body_inertia"], (2.0, 1.0, 2.5, 0.0, 0.0, 0.0), atol=1e-15)
+    other = tmt.equations(replace(tree, mass=[1.0 + 2.0**-52]), "c header", ["bias"], name="thing")
+    digests = [re.search("sha256 ([0-9a-f]{16})", version)[1] for version in (text, other)]
+    assert digests[0] != digests[1]

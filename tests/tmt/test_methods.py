@@ -79,6 +79,38 @@ def test_which_gains_are_implicit(name, speed, position):
         assert np.allclose(slope, np.linalg.solve(matrix, force), atol=1e-11)
 
 
+def free_and_hinge(parent, body_joint, first):
+    """Three slides and a ball with one body, from joint `first`, and a hinge with another."""
+    kind, axis = ["hinge"] * 5, [[(0.0, 1.0, 0.0)]] * 5
+    kind[first : first + 4], axis[first : first + 4] = (
+        ["slide"] * 3 + ["ball"],
+        [*np.eye(3)[:, None], np.eye(3)],
+    )
+    inertia = np.diag([0.02, 0.03, 0.04])
+    return tmt.Tree(
+        list("abcde"), parent, np.zeros((5, 3)), np.concatenate(axis), [0.1] * 7, ["one", "two"], body_joint, [1.0, 2.0],
+        [(0.1, 0.2, 0.3)] * 2, [inertia] * 2, (0.0, 0.0, -9.81), kind,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("tree, lone", [
+    (free_and_hinge((-1, 0, 1, 2, -1), (3, 4), 0), range(6)),  # beside it
+    (free_and_hinge((-1, 0, 1, 2, 3), (3, 4), 0), ()),  # which it carries
+    (free_and_hinge((-1, 0, 1, 2, 3), (0, 4), 1), ()),  # on which it is
+    (free_and_hinge((-1, -1, 1, 2, 3), (0, 4), 1), range(1, 7)),
+])  # fmt: skip
+def test_implicitfast_takes_the_bias_of_a_free_body_implicitly_if_it_is_alone(tree, lone):
+    """The linear system, with differences of the bias, which is a square of the speeds."""
+    q = np.array(tree.coordinates.move(list(tree.zero), [0.3, -0.2, 0.5, 0.4, 0.1, -0.6, 0.2]))
+    qd, tau, dt = np.array([0.5, -1.0, 2.0, 1.5, -0.7, 0.3, 1.1]), np.linspace(-1.0, 1.0, 7), 0.1
+    rates = [(tmt.bias(q, qd + u, tree) - tmt.bias(q, qd - u, tree)) / 2.0 for u in np.eye(7)]
+    matrix = tmt.mass_matrix(q, tree) + dt * np.diag(tree.damping)
+    matrix[list(lone)] += dt * np.transpose(rates)[list(lone)]
+    force = tau - 0.1 * qd - tmt.bias(q, qd, tree)
+    expected = qd + dt * np.linalg.solve(matrix, force)
+    assert np.abs(tmt.simulate(q, qd, tau, dt, 1, "implicitfast", tree).qd[1] - expected).max() < 1e-10
+
+
 def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
     left = DRIVEN.lock({"alpha": 0.3})
     assert np.array_equal(left.position_gain, P[1:, 1:]) and np.array_equal(left.speed_gain, S[1:, 1:])
