@@ -20,6 +20,8 @@ from .outside.file import EngineError, File, OtherJoints
 from .outside.model import SteppedModel
 from .outside.order import XYZW, Order, State
 from .warp import METHODS as OF_WARP
+from .warp import MOST_CONTACTS, MOST_ROWS
+from .warp import Stepper as OfWarp
 from .warp import methods_for as methods_of_warp
 
 ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton",
@@ -192,3 +194,32 @@ def read(file: File, **options: Any) -> Any:
     else:
         builder.add_mjcf(str(file.path), **options)
     return builder.finalize(device="cpu")
+
+
+class Stepper(OfWarp):
+    """The model that SolverMuJoCo makes of Newton's, stepped by MuJoCo Warp as the solver does."""
+
+    def __init__(self, file: File, model: Any):
+        super().__init__(file, model)
+        import newton
+
+        options = {name: int(getattr(model.opt, name)) for name in ("iterations", "ls_iterations")}
+        solver = newton.solvers.SolverMuJoCo(read(file), njmax=MOST_ROWS, nconmax=MOST_CONTACTS, **options)
+        self.model, self.put_model = solver.mj_model, solver.mjw_model
+        for name in ("nq", "nv", "nu", "na", "nbody", "ngeom"):
+            theirs, ours = getattr(self.model, name), getattr(model, name)
+            if theirs != ours:
+                raise ValueError(f"{name} is {theirs} in its model, {ours} in MuJoCo's")
+        for name in ("jnt_type", "qpos0"):
+            if not np.allclose(getattr(self.model, name), getattr(model, name), atol=1e-6):
+                raise ValueError(f"{name} is not that of MuJoCo's model")
+
+    def put(self, data: Any) -> Any:
+        from mujoco import MjData, mj_forward
+
+        copied = MjData(self.model)
+        for name in ("qpos", "qvel", "act", "ctrl", "qacc_warmstart"):
+            getattr(copied, name)[:] = getattr(data, name)
+        mj_forward(self.model, copied)
+        copied.qacc_warmstart[:] = data.qacc_warmstart
+        return super().put(copied)

@@ -6,7 +6,7 @@ import pytest
 
 from compare.engines import RECORDS
 from compare.engines.outside import Outside, as_it_runs
-from compare.engines.outside.as_it_runs import BEYOND, contacts_of, fields, one_run, runs
+from compare.engines.outside.as_it_runs import BEYOND, contacts_of, fields, one_run, run
 from compare.engines.outside.file import File
 
 # two hinges with dry friction, a servo, and a ball that falls on the floor and rolls
@@ -83,18 +83,17 @@ CHANGES = {
 
 @pytest.mark.parametrize("field", CHANGES)
 def test_the_first_other_field_is_that_which_a_change_of_the_model_changes_first(field, file):
-    made = runs(changed(CHANGES[field]), "float32", file())
-    assert made[0].first.field == field and made[0].over > 1.0
+    made = run(changed(CHANGES[field]), "float32", file())
+    assert made.first.field == field and made.over > 1.0
     owner = {"xpos": "lower", "M": "hip", "qfrc_passive": "hip", "qfrc_actuator": "hip", "efc_force": "hip"}
     if field in owner:
-        assert made[0].first.of == owner[field]
-    assert len(made) == 1  # iterations are those of the last try already
+        assert made.first.of == owner[field]
 
 
 def test_the_same_model_has_the_same_fields_whatever_the_order_of_rows_and_pairs(file):
     for kind in (Mujoco, changed(lambda m: None, is_reversed=True)):
-        (run,) = runs(kind, "float64", file())
-        assert run.first is None and run.over <= 1.0 and run.apart == {1: 0.0, 10: 0.0, 100: 0.0}
+        made = run(kind, "float64", file())
+        assert made.first is None and made.over <= 1.0 and made.apart == {1: 0.0, 10: 0.0, 100: 0.0}
 
 
 @pytest.mark.parametrize("precision", BEYOND)
@@ -102,8 +101,8 @@ def test_the_same_model_has_the_same_fields_whatever_the_order_of_rows_and_pairs
 def test_a_field_just_inside_and_just_outside_of_its_precision(precision, share, differs, file):
     """Of its largest entry: of the damping, of which the speed of one joint is the largest at each step."""
     by = 1.0 + share * BEYOND[precision]
-    run = runs(changed(lambda m: m.dof_damping.__imul__(by)), precision, file())[0]
-    assert (run.first is not None and run.first.field == "qfrc_passive") == differs
+    made = run(changed(lambda m: m.dof_damping.__imul__(by)), precision, file())
+    assert (made.first is not None and made.first.field == "qfrc_passive") == differs
 
 
 def test_what_a_solver_has_not_converged_to_goes_with_more_iterations(file):
@@ -115,10 +114,9 @@ def test_what_a_solver_has_not_converged_to_goes_with_more_iterations(file):
             copied.qacc_warmstart[:] = 0.0
             return copied
 
-    first, *more = runs(Cold, "float32", file(1, 1))
-    assert first.iterations == 1 and first.first.field == "efc_force"
-    assert more[-1].first is None and more[-1].iterations > 1 and more[-1].ls_iterations == 50
-    assert all(run.first for run in more[:-1])
+    first, last = (run(Cold, "float32", file(1, 1), iterations) for iterations in (None, 100))
+    assert (first.iterations, first.ls_iterations, first.first.field) == (1, 1, "efc_force")
+    assert (last.iterations, last.ls_iterations, last.first) == (100, 50, None)
 
 
 def test_free_runs_begin_at_the_first_keyframe_with_its_controls(file):
@@ -160,6 +158,7 @@ def test_an_engine_runs_a_file_as_mujoco_does_once_its_solver_has_converged(engi
     from compare.run.reference import compared_with
 
     path = file(1, 2).path
-    made = Outside(engine).of(compared_with("model", str(path)).robot.case()).ask(answers.runs_as_it_is)
-    assert made[0].first is not None and made[-1].first is None and made[-1].apart[100] < 1e-4
+    of = Outside(engine).of(compared_with("model", str(path)).robot.case())
+    first, last = (of.ask(answers.run_as_it_is, iterations) for iterations in (None, 100))
+    assert first.first is not None and last.first is None and last.apart[100] < 1e-4
     assert RECORDS[engine].precision == "float32"

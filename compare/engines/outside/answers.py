@@ -134,11 +134,9 @@ def ran(name: str, file: File, tree: tmt.Tree, course: Course) -> Motion:
     return motion._replace(evaluations=evaluations, seconds=time.perf_counter() - begin)
 
 
-def runs_as_it_is(name: str, file: File, tree: tmt.Tree) -> "list[Run]":
-    """The file's own run in an engine that steps MuJoCo's model; none in another one."""
-    kind = getattr(module_of(name), "Stepper", None)
-    if kind is None:
-        return []
-    from .as_it_runs import runs
+def run_as_it_is(name: str, file: File, tree: tmt.Tree, iterations: int | None) -> "Run | None":
+    """The file's run in an engine that steps MuJoCo's model, with its own iterations or others; None in another engine."""
+    from .as_it_runs import run
 
-    return runs(kind, RECORDS[name].precision, file)
+    kind = getattr(module_of(name), "Stepper", None)
+    return kind and run(kind, RECORDS[name].precision, file, iterations)

@@ -21,11 +21,7 @@ from .file import File
 STEPS, LISTED = 100, (1, 10, 100)  # of the file's own; those after which free runs are compared
 # largest difference of a field over its largest entry that is that of the precision
 BEYOND = {"float32": 1e-4, "float64": FACTOR * EPS}
-# that are tried where a field differs: what a solver has not converged to is not the engine's error
-ITERATIONS, LS_ITERATIONS = (2, 4, 100), 50
-SLOW = (
-    20.0  # s of the processor, of a run with its compilation, after which only the most iterations are tried
-)
+LS_ITERATIONS = 50  # at least, of a run with more iterations than the file's own
 # an acceleration solves M, and the solver stops at its own tolerance
 SOLVED = "qacc_smooth", "efc_force", "qfrc_constraint", "qacc", "qvel after", "qpos after"
 
@@ -78,24 +74,15 @@ class Stepper(ABC):
         """Data of the engine's in MuJoCo's."""
 
 
-def runs(kind: Callable[[File, Any], Stepper], precision: str, file: File) -> list[Run]:
-    """The file's own run, and where it differs those with more iterations, until one does not."""
+def run(kind: Callable[[File, Any], Stepper], precision: str, file: File, iterations: int | None = None) -> Run:
+    """A run of the file by an engine; iterations: of the solver, with LS_ITERATIONS at least; None: the file's own."""
     source = Source(file.path, file.floating)
-    model, beyond = mujoco.MjModel.__copy__(source.model), BEYOND[precision]
+    model = mujoco.MjModel.__copy__(source.model)
     model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    own = int(model.opt.iterations)
-    made = [one_run(kind, file, model, beyond)]
-    more = [count for count in ITERATIONS if count > own]
-    for count in more if made[0].seconds < SLOW else more[-1:]:
-        if made[-1].first is None:
-            break
-        model.opt.iterations, model.opt.ls_iterations = (
-            count,
-            max(LS_ITERATIONS, source.model.opt.ls_iterations),
-        )
-        made.append(one_run(kind, file, model, beyond))
-    return made
+    if iterations is not None:
+        model.opt.iterations, model.opt.ls_iterations = iterations, max(LS_ITERATIONS, model.opt.ls_iterations)
+    return one_run(kind, file, model, BEYOND[precision])
 
 
 def one_run(

@@ -10,6 +10,7 @@ from ...core.finding import Finding
 from ...core.text import say
 from ...engines import LABELS, RECORDS, EngineRecord
 from ...engines.outside import Outside, OutsideDynamics, answers
+from ...engines.outside.as_it_runs import Run
 from ...engines.outside.file import EngineError, OtherJoints, OtherNames, TooLong, Unread
 from ...judge.agree import closest, over
 from ...judge.entries import Entries
@@ -34,6 +35,7 @@ EXPERIMENT = Experiment(
     first_screen=("answer",),
 )
 COMPARED = ("Mbar", "bias", "qdd")
+ITERATIONS, SLOW = (2, 4, 100), 20.0  # that are tried where a field differs; s of the processor, of a run that is slow
 TABLES = "answer", "read", "runs"
 # of which nothing more is said; their names are kinds in the template
 NOT_ASKED = Unread, OtherJoints, OtherNames
@@ -181,29 +183,37 @@ def asked_at(setup: Setup, precision: str) -> Sample:
 
 
 def add_runs(result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics) -> None:
-    """Rows and a check of the file as it runs in an engine that steps MuJoCo's model."""
-    answer, unit = result.answers[record.label], movement_unit(setup.robot.coordinates)
-    try:
-        runs = dynamics.ask(answers.runs_as_it_is)
-    except TooLong:
-        raise
-    except EngineError as error:
-        answer["runs"] = {"why_not": str(error).rstrip(".")}
-        result.find("not_run", engine=record.label, reason=str(error).rstrip("."))
-        return
-    if not runs:
-        return
+    """Rows and a check of the file as it runs in an engine that steps MuJoCo's model.
+
+    Where a field differs, it runs with more iterations too, until none does: what the solver has not converged to is not the
+    engine's error. Where compilation is slow, with the most iterations alone.
+    """
+    answer, unit, runs = result.answers[record.label], movement_unit(setup.robot.coordinates), list[Run]()
+    more: list[int | None] = [None, *ITERATIONS]
+    while more and not (runs and runs[-1].first is None):
+        iterations = more.pop(0)
+        if iterations is not None and iterations <= runs[0].iterations:
+            continue
+        try:
+            run = dynamics.ask(answers.run_as_it_is, iterations)
+        except EngineError as error:
+            if not runs:
+                answer["runs"] = {"why_not": str(error).rstrip(".")}
+                result.find("not_run", engine=record.label, reason=str(error).rstrip("."))
+                return
+            break
+        if run is None:  # the engine has no model of MuJoCo's
+            return
+        runs.append(run)
+        more = more[-1:] if run.seconds > SLOW else more
     answer["runs"] = {"runs": runs, "unit": unit}
     for run in runs:
-        first: dict[str, Any] = (
-            {f"first_{name}": value for name, value in run.first._asdict().items()} if run.first else {}
-        )
+        first: dict[str, Any] = {f"first_{name}": value for name, value in run.first._asdict().items()} if run.first else {}
         apart: dict[str, Any] = {f"apart_{steps}": run.apart.get(steps) for steps in (1, 10, 100)}
         result.tables["engines_runs"].append(RunRow(
             engine=record.label, iterations=run.iterations, ls_iterations=run.ls_iterations, own_settings=run is runs[0],
             unit=unit, **apart, **first,
         ))  # fmt: skip
-    # what a solver has not converged to is not the engine's error
     last, note = runs[-1], ""
     if last.first:
         note = f"{last.first.field}[{last.first.of}] at step {last.first.step}"
