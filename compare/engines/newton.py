@@ -4,6 +4,7 @@ Its coordinates differ from MuJoCo's: slides before hinges in a body; no `ref`; 
 the axes of its joint; of a free body the velocity of its centre of mass and the angular velocity in world axes.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -14,10 +15,10 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, EngineRecord
+from . import Array, Course, EngineRecord
 from .outside.bodies import Body, Link
 from .outside.file import EngineError, File, OtherJoints
-from .outside.model import SteppedModel
+from .outside.model import ReadModel
 from .outside.order import XYZW, Order, State
 from .warp import METHODS as OF_WARP
 from .warp import MOST_CONTACTS, MOST_ROWS
@@ -45,7 +46,7 @@ def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
     return METHODS | by_mujoco(methods_of_warp(tree))
 
 
-class Model(SteppedModel):
+class Model(ReadModel):
     def __init__(self, file: File, precision: str):
         import newton
         import warp
@@ -130,11 +131,10 @@ class Model(SteppedModel):
         return links
 
     def set_body(self, link: Link, body: Body) -> None:
-        numbers = {"mass": body.mass, "com": body.com, "inertia": body.inertia}
+        numbers = dict(zip(("mass", "com", "inertia"), body))
         numbers["inv_mass"] = 1.0 / body.mass if body.mass else 0.0
         numbers["inv_inertia"] = np.linalg.inv(body.inertia) if body.mass else np.zeros((3, 3))
-        for name, value in numbers.items():
-            array = getattr(self.model, f"body_{name}")
+        for array, value in ((getattr(self.model, f"body_{name}"), value) for name, value in numbers.items()):
             values = array.numpy()
             values[link.name] = value
             array.assign(values)
@@ -160,27 +160,47 @@ class Model(SteppedModel):
         return np.asarray(weight.numpy().astype(float) + rest.numpy() + M @ at.c)
 
     def start(self, at: State, dt: float, method: str | None) -> None:
+        """Prepare steps of dt from a state; method None: of Featherstone's, without damping and springs."""
         for name in PASSIVE:
             values = self.used[name][self.order.v] * (method is not None)
             getattr(self.model, f"joint_{name}").assign(values)
         is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
         is_damped = self.used["damping"][self.order.is_of_free()].any()
         if method == FEATHERSTONE and (is_damped or self.used["stiffness"][is_of_ball].any()):
-            missing = "no springs of ball joints and no damping of free joints"
-            raise EngineError(f"the Featherstone solver has {missing}")
+            raise EngineError(
+                "the Featherstone solver has no springs of ball joints and no damping of free joints"
+            )
         self.set_state(at)
         self.method, self.dt = method or FEATHERSTONE, dt
-
-    def set_force(self, force: Array) -> None:
-        self.control.joint_f.assign(force)
 
     def step(self) -> None:
         self.solver(self.method).step(self.state, self.next, self.control, None, self.dt)
 
-    def reached(self) -> tuple[Array, Array]:
+    def reached(self, force: Array) -> tuple[Array, Array]:
+        """Positions and speeds after a step under a force, the start of the next one."""
+        self.control.joint_f.assign(force)
+        self.step()
         self.state, self.next = self.next, self.state
         x, u = (values.numpy().astype(float) for values in (self.state.joint_q, self.state.joint_qd))
         return x, u
+
+    def acceleration(self, at: State, force: Array) -> Array:
+        self.start(at, 1.0, None)
+        return self.reached(force)[1] - at.u
+
+    def step_alone(self, course: Course) -> Callable[[], object]:
+        self.start(self.order.state(course.q, course.v), course.dt, course.method)
+        return self.step
+
+    def run(self, course: Course) -> tuple[Array, int]:
+        at, states = self.order.state(course.q, course.v), [course.start]
+        self.start(at, course.dt, course.method)
+        for step in range(1, course.steps + 1):
+            q, v = self.order.tree_state(*self.reached(at.force(course.tau)))
+            at = self.order.state(q, v)
+            if step % course.every == 0:
+                states.append(np.concatenate([q, v]))
+        return np.array(states), course.steps
 
 
 def read(file: File, **options: Any) -> Any:

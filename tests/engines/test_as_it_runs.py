@@ -105,6 +105,22 @@ def test_a_field_just_inside_and_just_outside_of_its_precision(precision, share,
     assert (made.first is not None and made.first.field == "qfrc_passive") == differs
 
 
+@pytest.mark.parametrize("integrator, differs", (("RK4", False), ("EULER", True)))
+def test_the_mean_of_stages_in_qacc_is_no_difference(integrator, differs, file):
+    """An engine that leaves the acceleration of another stage there, with the right motion."""
+
+    class LastStage(Mujoco):
+        def step(self, data):
+            super().step(data)
+            data.qacc[:] *= 1.5
+            return data
+
+    path = file().path
+    path.write_text(path.read_text().replace("<option", f'<option integrator="{integrator.replace("EULER", "Euler")}"'))
+    made = run(LastStage, "float32", File(path, (), ()))
+    assert (made.first is not None) == differs and (not differs or made.first.field == "qacc")
+
+
 def test_what_a_solver_has_not_converged_to_goes_with_more_iterations(file):
     """A warm start that is lost: another force of friction after one iteration, the same one after more."""
 
@@ -153,12 +169,16 @@ ENGINES = [name for name in ("mjx_float32", "warp", "newton") if not Outside(nam
 
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
-def test_an_engine_runs_a_file_as_mujoco_does_once_its_solver_has_converged(engine, file, tmp_path):
+def test_an_engine_runs_a_file_nearly_as_mujoco_does_once_its_solver_has_converged(engine, file):
+    """In single precision MJX's solver leaves 1e-3 of an acceleration where friction holds; Newton's integrator is implicitfast."""
     from compare.engines.outside import answers
     from compare.run.reference import compared_with
 
     path = file(1, 2).path
     of = Outside(engine).of(compared_with("model", str(path)).robot.case())
     first, last = (of.ask(answers.run_as_it_is, iterations) for iterations in (None, 100))
-    assert first.first is not None and last.first is None and last.apart[100] < 1e-4
+    assert first.first.field == "efc_force" and last.over < 1e-2 * first.over or engine == "newton"
+    same = "xpos", "M", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "contacts", "dist", "efc_J", "efc_aref", "qacc_smooth"
+    assert max(last.largest[name] for name in (*same, "efc_force")) < BEYOND["float32"]
+    assert last.apart[100] < 1e-4 or engine == "newton"
     assert RECORDS[engine].precision == "float32"

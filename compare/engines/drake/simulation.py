@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from .. import Array, Course
+from ..outside.file import EngineError
 from ..outside.order import Order
 
 SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
@@ -23,37 +24,19 @@ class Simulation:
 
         self.plant, self.order = plant, order
         is_of_ball = np.array(order.file.coordinates.kinds_of_speeds) == "ball"
-        turns = course.tau[order.is_of_free() | is_of_ball].any()
-        simulator = self.simulator = Simulator(self.with_force(course) if turns else plant)
+        if course.tau[order.is_of_free() | is_of_ball].any():
+            raise EngineError(
+                "a constant torque on a ball or a free body would turn with it, as Drake's axes do not"
+            )
+        simulator = self.simulator = Simulator(plant)
         self.context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-        if not turns:
-            fixed_force(plant, self.context).SetFromVector(course.tau[order.v])
+        fixed_force(plant, self.context).SetFromVector(course.tau[order.v])
         if course.method != DISCRETE:
             scheme = SCHEMES[course.method.removesuffix(" adaptive")][1]
             integrator = ResetIntegratorFromFlags(simulator, scheme, course.dt if course.steps else LONGEST)
             integrator.set_fixed_step_mode(course.tolerance is None)
             if course.tolerance or course.method in ITERATES:
                 integrator.set_target_accuracy(course.tolerance or ITERATED)
-
-    def with_force(self, course: Course) -> Any:
-        """A system of the plant and of the force of a course, in Drake's axes, computed in Python at each evaluation."""
-        from pydrake.systems.framework import DiagramBuilder, LeafSystem
-
-        nq, order = self.plant.num_positions(), self.order
-
-        def set_force(context: Any, output: Any) -> None:
-            state = forces.get_input_port().Eval(context)
-            q, _ = order.tree_state(state[:nq], state[nq:])
-            output.SetFromVector(order.state(q).force(course.tau))
-
-        forces, builder = LeafSystem(), DiagramBuilder()
-        forces.DeclareVectorInputPort("state", self.plant.num_multibody_states())
-        forces.DeclareVectorOutputPort("force", self.plant.num_velocities(), set_force)
-        builder.AddSystem(self.plant)
-        builder.AddSystem(forces)
-        builder.Connect(self.plant.get_state_output_port(), forces.get_input_port())
-        builder.Connect(forces.get_output_port(), self.plant.get_applied_generalized_force_input_port())
-        return builder.Build()
 
     def run(self, course: Course) -> tuple[Array, int]:
         """See ReadModel.run."""

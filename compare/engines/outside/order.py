@@ -44,7 +44,6 @@ NUMBER = Code(1, np.array, np.array)
 CIRCLE = Code(2, lambda q: np.r_[np.cos(q), np.sin(q)], lambda x: np.arctan2(x[1:], x[:1]))
 WXYZ = Code(4, np.array, unit)
 XYZW = Code(4, lambda q: np.roll(q, -1), lambda x: unit(np.roll(x, 1)))
-VECTOR = Code(3, lambda q: rotation(q).as_rotvec(), lambda x: quaternion(Rotation.from_rotvec(x)))
 ANGLES = Code(3, lambda q: rotation(q).as_euler("xyz"), lambda x: quaternion(Rotation.from_euler("xyz", x)))
 
 

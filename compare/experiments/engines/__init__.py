@@ -35,7 +35,11 @@ EXPERIMENT = Experiment(
     first_screen=("answer",),
 )
 COMPARED = ("Mbar", "bias", "qdd")
-ITERATIONS, SLOW = (2, 4, 100), 20.0  # that are tried where a field differs; s of the processor, of a run that is slow
+MOST_SHOWN = 12  # speeds of a robot whose state stands in the note of a check
+ITERATIONS, SLOW = (
+    (2, 4, 100),
+    20.0,
+)  # that are tried where a field differs; s of the processor, of a run that is slow
 TABLES = "answer", "read", "runs"
 # of which nothing more is said; their names are kinds in the template
 NOT_ASKED = Unread, OtherJoints, OtherNames
@@ -152,6 +156,7 @@ def compare_quantity(
     state, *entry = worst = closest(distance, tolerance)
     numbers = {name: [repr(float(x)) for x in getattr(sample, name)[state]] for name in ("q", "qd", "tau")}
     note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
+    note = note if sample.tree.coordinates.nv <= MOST_SHOWN else sample.describe(state)
     unit = quantity.unit(sample.tree)
     check = result.check(
         record.label,
@@ -208,7 +213,9 @@ def add_runs(result: EnginesResult, setup: Setup, record: EngineRecord, dynamics
         more = more[-1:] if run.seconds > SLOW else more
     answer["runs"] = {"runs": runs, "unit": unit}
     for run in runs:
-        first: dict[str, Any] = {f"first_{name}": value for name, value in run.first._asdict().items()} if run.first else {}
+        first: dict[str, Any] = (
+            {f"first_{name}": value for name, value in run.first._asdict().items()} if run.first else {}
+        )
         apart: dict[str, Any] = {f"apart_{steps}": run.apart.get(steps) for steps in (1, 10, 100)}
         result.tables["engines_runs"].append(RunRow(
             engine=record.label, iterations=run.iterations, ls_iterations=run.ls_iterations, own_settings=run is runs[0],
