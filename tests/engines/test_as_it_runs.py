@@ -170,14 +170,14 @@ ENGINES = [name for name in ("mjx_float32", "warp", "newton") if not Outside(nam
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_engine_runs_a_file_nearly_as_mujoco_does_once_its_solver_has_converged(engine, file):
-    """In single precision MJX's solver leaves 1e-3 of an acceleration where friction holds; Newton's integrator is implicitfast."""
+    """MJX leaves 1e-3 of an acceleration where friction holds, in single precision; Newton's integrator is implicitfast."""
     from compare.engines.outside import answers
     from compare.run.reference import compared_with
 
     path = file(1, 2).path
     of = Outside(engine).of(compared_with("model", str(path)).robot.case())
     first, last = (of.ask(answers.run_as_it_is, iterations) for iterations in (None, 100))
-    assert first.first.field == "efc_force" and last.over < 1e-2 * first.over or engine == "newton"
+    assert (first.first.field == "efc_force" and last.over < 1e-2 * first.over) or engine == "newton"
     same = "xpos", "M", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "contacts", "dist", "efc_J", "efc_aref", "qacc_smooth"
     assert max(last.largest[name] for name in (*same, "efc_force")) < BEYOND["float32"]
     assert last.apart[100] < 1e-4 or engine == "newton"
