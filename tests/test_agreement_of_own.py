@@ -2,6 +2,7 @@
 
 import os
 import time
+import warnings
 from functools import partial
 from pathlib import Path
 
@@ -263,6 +264,50 @@ def test_fewer_than_eight_rows_are_no_table_of_which_one_is_wrong(count, is_tabl
     states, h = table(count)
     h[3, 1] += 0.01
     assert ("1 row of" in message_of(bias=h, **states)) is is_table
+
+
+HEAVIER = PENDULUM.replace('mass="2"', 'mass="2.2"')
+
+
+@pytest.mark.parametrize("of", ["bias", "acceleration"])
+def test_a_wrong_number_in_values_with_noise_has_its_uncertainty(of):
+    """200 rows with 0.1 % noise: 2 kg to within four of the deviations that are said; noise alone is no cause."""
+    rng = np.random.default_rng(5)
+    states = dict(zip(("q", "qd", "tau"), rng.uniform(-2.0, 2.0, (3, 200, 2))))
+    function = RIGHT[of]
+    values = np.array([function(*state[: 3 if of == "acceleration" else 2]) for state in zip(*states.values())])
+    values = values * (1.0 + 1e-3 * rng.normal(size=values.shape))
+    states = states if of == "acceleration" else {name: states[name] for name in ("q", "qd")}
+    said = message_of(HEAVIER, **{of: values}, **states).partition("Probable cause: mass of body")[2].split()
+    value, deviation = float(said[1]), float(said[3])
+    assert abs(value - 2.0) < 4.0 * deviation < 0.01 and said[4:7] == ["kg", "instead", "of"]
+    alone = message_of(**{of: values}, **states)
+    assert "Probable cause" not in alone and "differ by noise of 0." in alone and "rows of 200" not in alone
+
+
+def test_a_difference_in_one_entry_alone_is_no_noise():
+    states, h = table(200)
+    h[:, 0] += 0.01 * np.sin(7.0 * states["q"][:, 0])
+    assert "noise" not in message_of(bias=h, **states)
+
+
+def test_rows_are_wrong_where_the_others_are_right_to_rounding():
+    states, h = table(40)
+    h *= 1.0 + 1e-3 * np.random.default_rng(1).normal(size=h.shape)
+    assert "rows of 40" not in message_of(bias=h, **states, rtol=1e-4)
+    states, h = table(40)
+    h[4] += 1.0
+    assert "1 row of 40" in message_of(bias=h, **states, rtol=1e-6)
+
+
+@pytest.mark.parametrize("qd, warns", [(np.zeros((3, 2)), True), (0.0, False), (np.eye(3, 2), False)])
+def test_a_table_without_speeds_says_that_velocity_terms_were_not_compared(qd, warns):
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 2))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        agrees(bias=bias, q=q, qd=qd)
+        agrees(mass_matrix=mass_matrix, q=q, qd=qd)
+    assert [("velocity terms" in str(one.message), one.filename) for one in caught] == [(True, __file__)] * warns
 
 
 def test_an_entry_that_agrees_has_no_cause():

@@ -51,7 +51,7 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, wo
 
 
 @pytest.mark.parametrize("asked, joints", [
-    ("mine.py:Object", None), ("mine:inside.also", None), ("mine.py:named", None), ("mine.py:swapped", "knee,hip"),
+    ("mine.py:Object", None), ("mine.py:named", None), ("mine.py:swapped", "knee,hip"),
 ])  # fmt: skip
 def test_right_equations_agree_in_whatever_form(folder, asked, joints):
     run = examined(folder, asked, STATIC, joints=joints)
@@ -148,7 +148,7 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
 
 @pytest.mark.parametrize("asked, word", [
     ("nowhere/mine.py:Object", "nowhere/mine.py"), ("mne:Object", "mine"), ("no such:Object", "'no such'"),
-    (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.alsso", "known: also"),
+    (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.also", "no 'inside.also'"), ("mine.py:insied", "known: inside"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
     ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "'mass'"),
     ("mine.py:&--joints&-hip,ankle", "'ankle'"),

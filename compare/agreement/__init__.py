@@ -88,7 +88,7 @@ def assert_agrees(
     mjcf : path, MJCF text or MjModel
         Its contacts, limits, actuators and equalities are switched off.
     mass_matrix, bias, gravity, acceleration : optional, at least one
-        mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state or a batch,
+        mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state,
         the array of its values at the given q, qd, tau, or a pair of a SymPy matrix and its list of symbols.
     q, qd, tau : (N, nq), (N, nv), (N, nv), optional
         The states, in your joints; None: `states` random states from `seed`, within the joints' ranges.

@@ -88,6 +88,8 @@ class Comparison:
             self.equations = OwnEquations(functions, self.coordinates, self.joints, self.tree, ())
         if q is not None:
             self.take_states(q, qd, tau)
+            if np.ndim(qd) and not self.qd.any() and {"bias", "acceleration"} & {*self.brought}:
+                warnings.warn("qd is 0 at all states: no velocity terms are compared", stacklevel=3)
             if states != DEFAULT_STATES:
                 text = f"states={shown(states)} is not used: the {len(self.q)} states of q are compared"
                 warnings.warn(text, stacklevel=3)

@@ -9,7 +9,7 @@ from numpy import ndarray
 from ..core.finding import Finding
 from ..engines.own import QUANTITIES
 from ..judge.agree import over
-from ..judge.scale import EPS
+from ..judge.scale import EPS, FACTOR
 from .comparison import Compared, Comparison
 
 FEW = 0.15  # of the rows, at most
@@ -52,7 +52,9 @@ def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Ite
             of_states = bool((rounded > 10.0**-digits).any())
             yield slip("rounded", decimals=digits, rtol=float(f"{least:.0e}") * 2.0, of_states=of_states)
     rows = np.flatnonzero(wrong.any(axis=1)).tolist()
-    if len(rows) <= FEW * count:
+    others = np.abs(yours - right)[~wrong.any(axis=1)]
+    are_exact = bool((others <= (FACTOR * EPS * compared.scale.reshape(count, -1))[~wrong.any(axis=1)]).all())
+    if len(rows) <= FEW * count and are_exact:
         at = np.argwhere(wrong)[:SHOWN].tolist()
         values = [(row, names[k], float(yours[row, k]), float(right[row, k])) for row, k in at]
         yield slip("wrong_rows", rows=rows, values=values, count=count)
@@ -96,6 +98,7 @@ def columns_exchanged(yours: ndarray, right: ndarray, tolerance: ndarray, wrong:
         return {}
     off = np.abs(yours[:, columns, None] - right[:, None, columns])
     same = (off <= tolerance[:, columns, None] + tolerance[:, None, columns]).all(axis=0)
+    np.fill_diagonal(same, False)
     if not (len(columns) and same.any(axis=1).all()):
         return {}
     return dict(zip(columns.tolist(), columns[same.argmax(axis=1)].tolist()))

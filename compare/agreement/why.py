@@ -16,6 +16,7 @@ from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
 from ..diagnosis.model import ROUNDED
+from ..diagnosis.noise import through_noise
 from ..engines.own import QUICK, OwnEquations
 from ..judge.entries import Entries
 from ..robots.coordinates import Coordinates
@@ -106,14 +107,37 @@ def cause_of(comparison: Comparison) -> Why:
     values = Values.of(tree, q, qd, M, h, rounding)
     if failing == ["acceleration"]:
         asked = Asked(tree, comparison.coordinates, comparison.equations, Stated(comparison.joints), rounding)
-        return of_accelerations(asked, values, tau, yours["acceleration"])
+        why = of_accelerations(asked, values, tau, yours["acceleration"])
+        return why if why.is_found else of_noise(comparison, "acceleration") or why
     of_h = values
     if "gravity" in yours and ("bias" not in yours or ("gravity" in failing and "bias" not in failing)):
         of_h = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
     why = of_equations(comparison, of_h)
+    if not why.is_found and (noisy := of_noise(comparison, "bias" if of_h is values else "gravity")):
+        return noisy
     if "acceleration" not in failing or not why.is_found or M is None or h is None:
         return why
     return why._replace(text=f"{why.text} {beside(comparison, values, tau, yours['acceleration'])}".rstrip())
+
+
+def of_noise(comparison: Comparison, name: str) -> Why | None:
+    """A number that is wrong in tables with noise, with its uncertainty, or noise alone; None: something else.
+
+    name: of the table of h, of gravity or of accelerations.
+    """
+    tree, q, qd, given = comparison.tree, comparison.q, comparison.qd, comparison.values
+    equations = comparison.equations
+    if equations is not None and any(map(equations.has, given)):
+        return None
+    qdd, h, M = None, given.get(name), given.get("mass_matrix")
+    if name == "acceleration":
+        qdd, M = h, None
+        h = comparison.tau - np.array(tree.damping) * qd - literal.spring_torque(q, tree)
+    found = through_noise(tree, Values.of(tree, q, 0.0 * qd if name == "gravity" else qd, M, h), qdd)
+    if found is None:
+        return None
+    text = say(Finding("agreement", "noisy" if found.place else "noise_alone", {"found": found}))
+    return Why(text, found.place is not None)
 
 
 def some_states(comparison: Comparison) -> ndarray:

@@ -11,7 +11,6 @@ from sympy.physics.mechanics import dynamicsymbols
 
 import tmt
 from compare.engines.own import METHOD_NAMES, QUANTITIES, Own, OwnEquations, OwnError
-from compare.engines.own.functions import same
 from compare.engines.tmt import Tmt
 from compare.process.interrupt import Now
 from compare.robots.arm import ARM
@@ -50,30 +49,28 @@ def of_one(name, function, coordinates=COORDINATES):
     return OwnEquations({name: function}, coordinates, required=())
 
 
-@pytest.mark.parametrize("source, is_batched", [
-    (tmt.ARM, True), (tmt, True), (types.SimpleNamespace(**OF_TMT), True),
-    ({name: single(function) for name, function in OF_TMT.items()}, False),
+@pytest.mark.parametrize("source", [
+    tmt.ARM, tmt, types.SimpleNamespace(**OF_TMT), {name: single(function) for name, function in OF_TMT.items()},
 ], ids=["tree", "module", "object", "mapping"])  # fmt: skip
-def test_every_form_gives_the_same_in_any_batch(source, is_batched, rng):
+def test_every_form_gives_the_same_in_any_batch(source, rng):
     for batch in ((), (1,), (7,), (2, 3)):
         own = OwnEquations(source, COORDINATES, tree=ARM.tree)
         state = rng.uniform(-2.0, 2.0, (3, *batch, 3))
         for name in filter(own.has, QUANTITIES):
             found, right = asked(own, name, state), OF_TMT[name](*state[: QUANTITIES[name].arguments])
-            assert np.array_equal(found, right), name
-        assert own.problems == [] and (np.prod(batch) <= 1 or set(own.takes_batches.values()) == {is_batched})
+            assert np.allclose(found, right, rtol=1e-13, atol=1e-13), name
+        assert own.problems == []
 
 
-def test_a_batch_is_not_taken_where_its_values_or_its_components_are_others(rng):
-    """A norm of all states is that of none; q[0] of a (2, 2) batch is a state, which shapes alone do not show."""
-    q, v, _ = states(rng)
-    own = of_one("bias", lambda q, v: np.sin(q) / (1.0 + np.linalg.norm(v)))
+def test_a_function_is_called_once_at_each_state_and_with_one_state(rng):
+    (q, v, _), called = states(rng), []
+
+    def bias(q, v):
+        called.append(q.tolist())
+        return np.sin(q) / (1.0 + np.linalg.norm(v))
+
     right = np.sin(q) / (1.0 + np.linalg.norm(v, axis=1, keepdims=True))
-    assert np.allclose(own.bias(q, v), right, rtol=1e-14, atol=0.0) and own.takes_batches == {"bias": False}
-
-    own = of_one("mass_matrix", lambda q: np.array([[3.0 + q[1], q[1]], [q[1], 1.0]]), TWO)
-    assert np.array_equal(own.mass_matrix(q[:2, :2])[:, 0, 1], q[:2, 1])
-    assert own.takes_batches == {"mass_matrix": False}
+    assert np.allclose(of_one("bias", bias).bias(q, v), right, rtol=1e-14, atol=0.0) and called == q.tolist()
 
 
 @pytest.mark.parametrize("source", [
@@ -88,7 +85,6 @@ def test_sympy_matrices_with_their_symbols(source, rng):
     assert np.allclose(own.mass_matrix(q), [[[3.0, c], [c, 1.0]] for c in np.cos(q[:, 1])], atol=1e-15)
     right = [[a * b, s * a**2] for (a, b), s in zip(v, np.sin(q[:, 1]))]
     assert np.allclose(own.bias(q, v), right, atol=1e-15)
-    assert own.takes_batches == {"mass_matrix": True, "bias": True}
 
 
 @pytest.mark.parametrize("tree", [tmt.ARM, tmt.ARM.lock({"alpha": 0.1, "beta": 0.2})])
@@ -97,7 +93,6 @@ def test_sympy_matrices_with_their_symbols(source, rng):
     sympy.ImmutableDenseMatrix, lambda x: sympy.Matrix(x).tolist(), lambda x: x.T,
 ])  # fmt: skip
 def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, form, rng):
-    """A batch is not mixed up with it: of h (n, states) the states are asked one by one."""
     M, h = (lambda q: form(tmt.mass_matrix(q, tree))), (lambda q, v: form(tmt.bias(q, v, tree)))
     own = OwnEquations({"mass_matrix": M, "bias": h}, Coordinates(tree.joint_names))
     q, v = rng.uniform(-2.0, 2.0, (2, 7, len(tree.axis)))
@@ -231,12 +226,3 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
     assert motion.ended[0] is None and motion.ended[1].endswith("s: a number is not finite")
     assert np.isfinite(motion.q[0]).all() and np.isfinite(motion.q[1, 0]).all()
     assert np.isnan(motion.q[1, -1]).all() and own.equations.problems == []
-
-
-@pytest.mark.parametrize(
-    "off, equal", [(0.9e-12, True), (1.1e-12, False), (-1.1e-12, False), (np.nan, False)]
-)
-def test_a_batch_has_the_values_of_single_states_except_for_rounding_of_the_largest(off, equal):
-    singles = np.array([[1e3, np.nan], [0.0, np.inf]])
-    assert same(singles + [[0.0, 0.0], [1e3 * off, 0.0]], singles) is equal
-    assert not same(singles[0], singles)

@@ -51,9 +51,7 @@ class OwnEquations:
             raise OwnError(f"joint_names: {error}") from None
         nv = coordinates.nv
         self.shapes = {name: quantity.shape_for(nv) for name, quantity in QUANTITIES.items()}  # of one state
-        # of each function that was called
-        self.takes_batches: dict[str, bool] = {}
-        self.times: dict[str, tuple[float, float]] = {}  # of one state, alone and in a batch, s
+        self.times: dict[str, float] = {}  # of one state, s, of each function that was called
         self.errors: dict[tuple[str, str], Problem] = {}  # by the quantity and what is wrong
 
     def has(self, name: str) -> bool:
@@ -66,13 +64,12 @@ class OwnEquations:
 
     @property
     def seconds(self) -> float:
-        """The time of one call of each function that was called, at one state, s."""
-        return sum(single for single, _ in self.times.values())
+        """The time of one call of each function that was called, s."""
+        return sum(self.times.values())
 
     def affordable(self, states: int, seconds: float) -> int:
         """The number of states, at least 1, at which each function can be called once within a time, s."""
-        in_batches = sum(in_batch for _, in_batch in self.times.values())
-        return int(np.clip(seconds / in_batches, 1, states)) if in_batches else states
+        return int(np.clip(seconds / self.seconds, 1, states)) if self.seconds else states
 
     # quantities at states
 
@@ -128,8 +125,8 @@ class OwnEquations:
         """Call every function at the first of some states; OwnError if one cannot be used."""
         states = self.own_states(rows_of_states(q, v, tau)[1])
         for name in self.functions:
-            if name not in self.takes_batches:
-                self.first(name, states[: QUANTITIES[name].arguments])
+            if name not in self.times:
+                self.each(name, [part[:1] for part in states[: QUANTITIES[name].arguments]])
 
     # how functions are called
 
@@ -140,8 +137,6 @@ class OwnEquations:
         batch, rows = rows_of_states(*states)
         finite = np.isfinite(np.concatenate(rows, axis=1)).all(axis=1)  # not where a run has diverged
         own = self.own_states([part[finite] for part in rows])
-        if finite.any() and name not in self.takes_batches:
-            self.first(name, own)
         computed, raised = self.each(name, own)
         bad = ~np.isfinite(computed).all(axis=tuple(range(1, computed.ndim))) & ~raised
         self.note(name, "is not finite", own, bad)
@@ -155,51 +150,32 @@ class OwnEquations:
         return [way(part) for way, part in zip(ways, rows)]
 
     def each(self, name: str, states: States) -> tuple[ndarray, ndarray]:
-        """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised."""
-        raised = np.zeros(len(states[0]), bool)
-        if self.takes_batches.get(name) and len(raised):
-            with suppress(OwnError):  # it is located state by state
-                return self.called(name, states, len(raised)), raised
-        shape = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
-        values = np.full((len(raised), *shape), np.nan)
+        """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised.
+
+        OwnError if it raises where it is called for the first time.
+        """
+        raised, values = np.zeros(len(states[0]), bool), dict[int, ndarray]()
         for i in range(len(raised)):
+            state, started = [part[i] for part in states], time.perf_counter()
             try:
-                values[i] = self.called(name, [part[i] for part in states])
+                values[i] = self.called(name, state)
             except OwnError as error:
+                if name not in self.times:
+                    raise OwnError(f"{error}, at {state_in_words(state)}") from error
                 raised[i] = True
                 self.note(name, str(error), states, np.arange(len(raised)) == i)
-        return values, raised
+                continue
+            self.times[name] = min(self.times.get(name, np.inf), time.perf_counter() - started)
+            self.shapes[name] = values[i].shape
+        of_one = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
+        together = np.full((len(raised), *of_one), np.nan)
+        for i, value in values.items():
+            together[i] = value
+        return together, raised
 
-    def first(self, name: str, states: States) -> None:
-        """Call a function at one state (OwnError if it fails), then find out whether it takes batches."""
-        count = 3 if self.coordinates.nv == 2 else 2  # not as many as there are joints
-        singles: list[ndarray] = []
-        times = []
-        for i in range(min(count, len(states[0]))):
-            state = [part[i] for part in states]
-            started = time.perf_counter()
-            try:
-                singles.append(self.called(name, state))
-            except OwnError as error:
-                if i:  # it will be raised again, and noted
-                    break
-                raise OwnError(f"{error}, at {state_in_words(state)}") from error
-            times.append(time.perf_counter() - started)
-            self.shapes[name] = singles[0].shape
-        self.times[name] = min(times), min(times)
-        if len(singles) == count:
-            started = time.perf_counter()
-            with suppress(OwnError), warnings.catch_warnings(action="ignore"), np.errstate(all="ignore"):
-                together = self.called(name, [part[:count] for part in states], count, is_trial=True)
-                if functions.same(together, np.array(singles)):
-                    self.takes_batches[name] = True
-                    self.times[name] = min(times), (time.perf_counter() - started) / count
-        if len(states[0]) > 1:  # else another time
-            self.takes_batches.setdefault(name, False)
-
-    def called(self, name: str, states: States, count: int | None = None, is_trial: bool = False) -> ndarray:
-        """The value of a function at one state, or at count of them; OwnError if it is none."""
-        copies = [np.array(part) for part in states]
+    def called(self, name: str, state: States) -> ndarray:
+        """The value of a function at one state; OwnError if it is none."""
+        copies = [np.array(part) for part in state]
         try:
             with aside(f"your {name}") if Now.is_listening else nullcontext():
                 value = self.functions[name](*copies)
@@ -209,12 +185,10 @@ class OwnEquations:
             is_called_otherwise = isinstance(error, TypeError) and "positional argument" in str(error)
             hint = f"; expected {call(name)}" if is_called_otherwise else ""
             raise OwnError(f"{name} raised {functions.as_raised(error)}{hint}") from error
-        for symbol, before, after in zip(STATE, states, copies):
-            if not is_trial:
-                changed = np.any(np.atleast_2d(before != after), axis=1)
-                self.note(name, f"changes its argument {symbol}", list(map(np.atleast_2d, states)), changed)
-        shape = self.shapes[name] if count is None else (count, *self.shapes[name])
-        return functions.converted(name, value, shape)
+        for symbol, before, after in zip(STATE, state, copies):
+            changed, row = np.array([np.any(before != after)]), [part[None] for part in state]
+            self.note(name, f"changes its argument {symbol}", row, changed)
+        return functions.converted(name, value, self.shapes[name])
 
     def note(self, name: str, what: str, states: States, where: ndarray) -> None:
         """Add an error at those of the states (states, n), in the user's joints, where it occurred."""

@@ -47,7 +47,6 @@ METHOD_NAMES = {name: name for name in QUANTITIES} | {"gravity": "gravity_balanc
 INVERSE = "inverse_dynamics"  # the name of a function that brings Mbar and h
 PUSH = 2.0**20  # rad/s2: gravity, which is subtracted, rounds little of what it needs
 QUICK = 1e-3  # s per state: functions that are as fast as this are called some hundred times more
-SAME = 1e-12  # of the largest value: values of a batch and of single states are equal except for rounding
 MOST_SHOWN = 8  # numbers of a state in a message
 
 
@@ -192,9 +191,8 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
         raise OwnError(f"{name} cannot be evaluated as a function of {listed}: {error!r}") from None
 
     def function(*states: np.ndarray) -> np.ndarray:
-        columns = [column for state in states for column in np.moveaxis(state, -1, 0)][: len(plain)]
-        values = np.broadcast_arrays(*evaluated(*columns), columns[0])[:-1]
-        return np.stack(values, axis=-1).reshape((*states[0].shape[:-1], *shape))
+        numbers = [number for state in states for number in state][: len(plain)]
+        return np.array(evaluated(*numbers), dtype=float).reshape(shape)
 
     return function
 
@@ -253,12 +251,6 @@ def in_shape(array: np.ndarray, shape: tuple[int, ...]) -> np.ndarray | None:
     """An array in a shape that differs in axes of length 1 alone, as (n, 1) of a column; else None."""
     given, expected = ([n for n in axes if n != 1] for axes in (array.shape, shape))
     return array.reshape(shape) if given == expected else None
-
-
-def same(together: np.ndarray, singles: np.ndarray) -> bool:
-    """Whether a batch has the values of single states."""
-    allowed = SAME * np.abs(singles[np.isfinite(singles)]).max(initial=0.0)
-    return together.shape == singles.shape and np.allclose(together, singles, 0.0, allowed, equal_nan=True)
 
 
 def state_in_words(state: Sequence[Sequence[float] | np.ndarray]) -> str:

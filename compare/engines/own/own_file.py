@@ -1,7 +1,7 @@
 """A user's equations from a Python file or a module: FILE.py:OBJECT or MODULE:OBJECT.
 
-The last colon separates them, so that FILE may start with a Windows drive. OBJECT may be dotted; without it
-the object is the module itself. While it is imported, print writes to stderr, and no compiled files are
+The last colon separates them, so that FILE may start with a Windows drive. OBJECT is a plain name; without
+it the object is the module itself. While it is imported, print writes to stderr, and no compiled files are
 written.
 """
 
@@ -75,15 +75,12 @@ def module_named(name: str) -> ModuleType:
 
 
 def part_of(module: ModuleType, place: str, name: str) -> object:
-    """The object of a dotted name in a module; without a name the module itself."""
-    value = module
-    for part in filter(None, name.split(".")):
-        if not hasattr(value, part):
-            public = [other for other in dir(value) if other[0] != "_"]
-            names = [other for other in public if not inspect.ismodule(getattr(value, other, None))]
-            raise OwnError(f"{place} has no {part!r}{close_names(part, names)}")
-        value = getattr(value, part)
-    return value
+    """The object of a name in a module; without a name the module itself."""
+    if name and not hasattr(module, name):
+        public = [other for other in dir(module) if other[0] != "_"]
+        names = [other for other in public if not inspect.ismodule(getattr(module, other, None))]
+        raise OwnError(f"{place} has no {name!r}{close_names(name, names)}")
+    return getattr(module, name) if name else module
 
 
 def close_names(name: str, known: Sequence[str]) -> str:

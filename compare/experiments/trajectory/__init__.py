@@ -62,7 +62,7 @@ def cases_left_out(setup: Setup, cases: Sequence[Case]) -> dict[str, float | Non
         return left_out
     equations, left = setup.own.equations, SECONDS_OF_OWN[setup.size]
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
-    of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part][0] for part in parts)
+    of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part] for part in parts)
     for case in cases:
         if not methods_in(setup.own, case) or not case.scene.gravity:
             left_out[case.name] = None

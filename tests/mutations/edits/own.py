@@ -2,10 +2,8 @@
 
 EDITS = (
     # how they are asked
-    ("own.equations", "OwnEquations.first", "functions.same(*_1)", "True", "a batch that gives others is taken"),
     ("own.equations", "OwnEquations.called", "[np.array(part) for _1 in states]", "states", "nothing is copied"),
     ("own.equations", "OwnEquations.values_of", "np.isfinite(computed)", "computed == computed", "infinite values are taken"),
-    ("own.functions", "SAME", "1e-12", "1e-6", "a batch may differ by a millionth"),
     ("own.equations", "SKEW", "1e-9", "1e-8", "M may be ten times less symmetric"),
     ("own.equations", "OwnEquations.note", "_1 <= DIVERGED", "_1 <= np.inf", "a run that has diverged is a problem"),
     ("own.equations", "OwnEquations.each", "np.arange(_1) == i", "np.arange(_1) >= 0", "one that raises counts as all"),
