@@ -148,7 +148,8 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
 
 @pytest.mark.parametrize("asked, word", [
     ("nowhere/mine.py:Object", "nowhere/mine.py"), ("mne:Object", "mine"), ("no such:Object", "'no such'"),
-    (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.also", "no 'inside.also'"), ("mine.py:insied", "known: inside"),
+    (":Object", "':Object'"), ("./:Object", "folder"), ("mine.py:inside.also", "no 'inside.also'"),
+    ("mine.py:insied", "known: inside"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
     ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "'mass'"),
     ("mine.py:&--joints&-hip,ankle", "'ankle'"),

@@ -93,6 +93,16 @@ def test_a_quaternion_of_few_digits_is_made_one_of_length_1(tmp_path, length, ac
     assert np.allclose(Case(robot, scene).q, [*turn, 1.0, 0.0, 0.0, 0.0], rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.parametrize("length, accepted", [(1.0, True), (1.0 + 1e-5, False), (0.0, False)])
+def test_a_posture_of_a_case_has_a_quaternion_of_length_1(length, accepted):
+    robot = compared_with("model", str(PATHS["pendulum_ball"])).robot
+    posture = (*(length * np.array([0.5, 0.5, -0.5, 0.5])).tolist(), 1.0, 0.0, 0.0, 0.0)
+    if accepted:
+        return robot.case(posture=posture)
+    with pytest.raises(ValueError, match="length 1"):
+        robot.case(posture=posture)
+
+
 @posix
 def test_a_pipe_is_never_waited_for(tmp_path):
     os.mkfifo(tmp_path / "my.toml")

@@ -1,5 +1,6 @@
 """Runs of MuJoCo: how they end, the order of the Tree; its minimal calls in compiled loops and derivatives of steps."""
 
+import mujoco as plain
 import numpy as np
 import pytest
 from crane import crane
@@ -13,6 +14,7 @@ from compare.engines.mujoco.calls import left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
+from compare.robots.file import robot_of
 
 
 def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path, rng):
@@ -58,3 +60,19 @@ def test_a_step_is_differenced_in_movements(rng):
         assert np.allclose(A[np.ix_(order, order)], found, atol=1e-6)
     found = transition(dynamics, q[0], tau[0], 1e-9, "RK4")
     assert np.allclose(found, np.eye(2 * len(dynamics.dofs)), atol=1e-5)
+
+
+def test_forces_of_a_fluid_are_those_of_plain_mujoco(rng):
+    body = '<geom type="ellipsoid" size=".1 .2 .3" mass="1" pos=".3 0 .1"/></body></worldbody></mujoco>'
+    text = f'<mujoco><option density="1000" viscosity="0.5"/><worldbody><body><joint axis="0 1 0" damping="2"/>{body}'
+    found, model = read(text), plain.MjModel.from_xml_string(text)
+    dynamics = engine(found).of(robot_of(found, "a fin").case())
+    dynamics.bare, dynamics.model = False, found.model
+    data = plain.MjData(model)
+    q, v = rng.uniform(-1.0, 1.0, (2, 5, 1))
+    (name, *_), found = dynamics.other_forces(q, v).keys(), [*dynamics.other_forces(q, v).values()]
+    for k in range(5):
+        data.qpos[:], data.qvel[:] = q[k], v[k]
+        plain.mj_forward(model, data)
+        assert abs(data.qfrc_fluid[0]) > 1e-3 and found[0][k] == pytest.approx(data.qfrc_fluid, rel=1e-12)
+    assert "fluid" in name and not np.any(found[1:])

@@ -9,7 +9,7 @@ from models import PATHS
 from compare.core.check import Result
 from compare.engines.mujoco.parameters import Stated
 from compare.experiments import parameters
-from compare.experiments.parameters.numbers import compare_number
+from compare.experiments.parameters.numbers import compare_number, rows_of
 from compare.experiments.setup import Setup, engines
 from compare.run.reference import compared_with
 
@@ -62,6 +62,21 @@ def test_a_number_may_be_off_by_its_tolerance(quantity, stated, share, passes):
     number = Stated("arm", quantity, stated, stated + share * off, tolerance=off)
     causes = compare_number(result, number, "", {}).causes
     assert (result.checks[0].passed, not causes) == (passes, passes)
+
+
+def test_a_row_has_what_is_compiled_less_what_is_stated():
+    stated, compiled = np.array([1.0, 2.0, -3.0]), np.array([1.5, 2.0, 3.0])
+    rows = rows_of(Stated("arm", "com", stated, compiled), "m")
+    assert [(row.stated, row.compiled, row.difference) for row in rows] == [(1.0, 1.5, 0.5), (2.0, 2.0, 0.0), (-3.0, 3.0, 6.0)]
+    assert rows_of(Stated("arm", "com", None, compiled), "m")[0].difference is None
+
+
+@pytest.mark.parametrize("compiled, rank, is_said", [([0.0, -0.6, -0.8], 1, True), ([0.0, -0.6, 0.8], 2, False)])
+def test_an_axis_of_the_opposite_sense_is_a_convention_and_is_said(compiled, rank, is_said):
+    number = Stated("elbow", "axis", np.array([0.0, 0.6, 0.8]), np.array(compiled), tolerance=1e-12)
+    causes = compare_number(Result("parameters"), number, "", {}).causes
+    assert {cause.rank for cause in causes} == {rank}
+    assert {"opposite sign" in cause.text for cause in causes} == {is_said}
 
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
