@@ -81,7 +81,7 @@ def test_a_report_that_cannot_be_made_is_one_line_and_the_earlier_one_is_whole(t
     made(monkeypatch, "odd", rows=lambda setup: Result("odd", rows=rows))
     only(monkeypatch, "odd")
     with without_workers():
-        ran(tmp_path, "odd")
+        assert ran(tmp_path, "odd")[0] == 1  # nothing was checked
         before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
         rows.append(3)
         capsys.readouterr()

@@ -41,7 +41,8 @@ def listen() -> None:
     for number in numbers:
         signal.signal(number, hear)
     Now.is_listening = True
-    shield(False)
+    if Now.parent:
+        shield(False)  # it has been started deaf
 
 
 def hear(*_: object) -> None:
@@ -53,9 +54,9 @@ def hear(*_: object) -> None:
 def shield(is_on: bool = True) -> None:
     """Whether this thread, and what it starts, is deaf to what a terminal sends to all processes of a run."""
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(
-            signal.SIG_BLOCK if is_on else signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGHUP)
-        )
+        resource_tracker.ensure_running()  # unblocks signals where it starts
+        how = signal.SIG_BLOCK if is_on else signal.SIG_UNBLOCK
+        signal.pthread_sigmask(how, (signal.SIGINT, signal.SIGHUP))
 
 
 def answered(run: Callable[[], int]) -> int:
@@ -63,7 +64,6 @@ def answered(run: Callable[[], int]) -> int:
     status: Future[int] = Future()
 
     def carry_out() -> None:
-        resource_tracker.ensure_running()  # unblocks signals where it starts
         shield()
         try:
             status.set_result(run())

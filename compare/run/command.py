@@ -134,7 +134,7 @@ def write_report(
 
     sections, causes, needless = examined
     reference, robot, *_ = compared
-    count, subject = len(EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
+    count, subject = len(interrupted or EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
     words = verdict.verdict(sections, count, causes, subject, robot.name)
     left_out = reasons | needless
     if interrupted:
