@@ -15,6 +15,7 @@ from compare.cli import command_line
 from compare.core.check import Result
 from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
+from compare.experiments.setup import Request
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 from compare.run import command
@@ -134,6 +135,7 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
     setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
+    setup.request = Request()
     sections, causes, skipped = experiment.Run(names, setup, tmp_path, Terminal(), Writing(log)).examined()
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),

@@ -138,13 +138,8 @@ class Run:
         most, robot = EXPERIMENTS[name].quick_speeds, self.setup.robot
         fields = [option.removeprefix("--").replace("-", "_") for option in EXPERIMENTS[name].options]
         is_asked = any(getattr(self.setup.request, field, None) for field in fields)
-        if (
-            most is None
-            or robot.coordinates.nv <= most
-            or not self.setup.is_quick
-            or self.setup.alone
-            or is_asked
-        ):
+        is_small = most is None or robot.coordinates.nv <= most
+        if is_small or is_asked or self.setup.alone or not self.setup.is_quick:
             return ""
         return block("run", "not_quick", name=name, most=most)
 

@@ -168,12 +168,12 @@ def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, 
 
 def test_first_screen_of_several_experiments_has_the_answers_alone():
     result = Result("stability", notes=[Finding("stability", "examined")])
-    result.top = [result.finding(kind) for kind in ("limits_at", "answer", "rest", "cures")]
+    result.top = [result.finding(kind) for kind in ("limits_at", "answer", "rest", "remedies")]
     several, alone = (
         section_with("stability", result, ARM).result,
         section_with("stability", result, ARM, True).result,
     )
-    assert [text.kind for text in several.top] == ["answer", "cures"] and alone.top == result.top
+    assert [text.kind for text in several.top] == ["answer", "remedies"] and alone.top == result.top
     assert [text.kind for text in several.notes] == ["limits_at", "rest", "examined"]
 
 
