@@ -21,16 +21,18 @@ from compare.core.text import say
 from compare.engines import EngineRecord
 from compare.engines.outside import Outside
 from compare.engines.outside.as_it_runs import Difference, Run
-from compare.engines.outside.bodies import Body, combined, links_of, numbers_of, size_of
+from compare.engines.outside.bodies import OF_JOINTS, Body, combined, links_of, numbers_of, size_of
 from compare.engines.outside.file import EngineError, File
 from compare.engines.outside.model import Reading, ReadModel
 from compare.engines.outside.order import Order
 from compare.engines.tmt import TmtDynamics
 from compare.experiments.engines import EnginesResult, add_runs, compare_numbers, compare_quantities, is_same
+from compare.experiments.engines.readings import owner
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.arm import ARM
 from compare.run.examine import not_chosen
+from compare.run.reference import compared_with
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = [name for name, record in engines.RECORDS.items() if record.reads_file]
@@ -308,7 +310,11 @@ class Stepping:
         self.asked.append(iterations)
         if isinstance(self.runs, Exception):
             raise self.runs
-        found = self.runs[0] if iterations is None else next((run for run in self.runs if run.iterations == iterations), None)
+        found = (
+            self.runs[0]
+            if iterations is None
+            else next((run for run in self.runs if run.iterations == iterations), None)
+        )
         if iterations is not None and found is None:
             raise EngineError("no answer")
         return found
@@ -366,3 +372,39 @@ def test_without_another_engine_there_is_nothing_to_answer(monkeypatch):
     monkeypatch.setattr(Outside, "unavailable", lambda engine: "not installed")
     assert experiments.skipped("engines", ARM, "mujoco,drake").kind == "none_installed"
     assert experiments.skipped("engines", ARM, "mujoco,tmt").kind == "none_chosen"
+
+
+TWO_HINGES = """<mujoco><option gravity="1 2 -3"/><worldbody><body name="a">
+<joint name="hip" axis="0 1 0" damping="0.2"/>
+<inertial pos="0 0 -0.3" mass="1" diaginertia="0.03 0.03 0.01"/><body name="b" pos="0 0 -1">
+<joint name="knee" axis="0 1 0" damping="0.3"/>
+<inertial pos="0 0 -0.3" mass="1" diaginertia="0.03 0.03 0.01"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("number, read, cause", (
+    ("gravity", (0.0, 0.0, -9.81), "gravity of <option>"), ("gravity", (1.0, 2.0, 3.0), None),
+    ("damping", (0.0, 0.0), "damping of joints"), ("damping", (0.0, 0.3), None), ("damping", (0.1, 0.3), None),
+))  # fmt: skip
+def test_a_feature_is_a_cause_where_mujoco_has_the_engines_numbers_without_it(number, read, cause, tmp_path):
+    """Not where another number that it changes was read as it is stated."""
+    path = tmp_path / "robot.xml"
+    path.write_text(TWO_HINGES)
+    robot, result = compared_with("model", str(path)).robot, empty()
+    stated = numbers_of(robot.tree)
+    numbers = {name: stated[name] for name in OF_JOINTS} | {number: np.array(read)}
+    reading = Reading(numbers, stated, (), (number,), (number,), 0.0)
+    file = File(path, robot.joints, robot.coordinates.all_kinds)
+    compare_numbers(result, robot, RECORDS["float64"], file, reading)
+    rows = result.tables["engines_read"]
+    assert (
+        rows and {row.cause for row in rows} == {cause} and not any(row.set_by_this_program for row in rows)
+    )
+    said = say(result.notes[0])
+    assert f"Not set: {number}" in said and (cause or "No feature") in said
+
+
+def test_numbers_of_a_slide_are_in_its_own_units():
+    robot = compared_with("model", str(ROOT / "tests/models/gripper.xml")).robot
+    units = {unit: [owner(robot, name, place)[1] for name in ("armature", "damping", "stiffness")]
+             for place, unit in enumerate(robot.coordinates.units)}  # fmt: skip
+    assert units["m"] == ["kg", "N s/m", "N/m"] and units.get("rad", ["kg m2"])[0] == "kg m2"

@@ -2,7 +2,8 @@
 
 import importlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -29,13 +30,19 @@ T = TypeVar("T")
 
 def answer(act: Callable[..., T], *arguments: Any) -> T:
     """act(*arguments); EngineError with the reason, in one line, where it raises."""
-    try:
+    with raising(EngineError, with_place=True):
         return act(*arguments)
+
+
+@contextmanager
+def raising(kind: type[EngineError], with_place: bool) -> Iterator[None]:
+    """What is raised in this block as an error of a kind, in one line."""
+    try:
+        yield
     except EngineError:
         raise
     except (Exception, SystemExit) as error:  # the latter by assertions of Drake
-        kind = Unread if act is reading else EngineError
-        raise kind(in_one_line(" ".join(described(error, with_place=act is not reading).split()))) from None
+        raise kind(in_one_line(" ".join(described(error, with_place).split()))) from None
 
 
 def module_of(name: str) -> ModuleType:
@@ -48,7 +55,8 @@ def read(name: str, file: File, tree: tmt.Tree) -> tuple[ReadModel, Reading]:
     """The model of an engine, with the Tree's numbers as far as they can be set. Once in a process."""
     begin, record = time.perf_counter(), RECORDS[name]
     kind: type[ReadModel] = module_of(name).Model
-    model = kind(file, record.precision)
+    with raising(Unread, with_place=False):
+        model = kind(file, record.precision)
     model.stated = stated = model.numbers_stated(tree)
     numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
     lacking = [

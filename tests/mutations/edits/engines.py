@@ -17,7 +17,7 @@ EDITS = (
     ("outside.answers", "read", "differences(model.numbers(), *_1)", "()", "nothing is set, and it is said to be"),
     ("outside.bodies", "movement", "moved.origin - turn @ link.origin", "moved.origin", "an anchor is a point of a body"),
     ("outside.bodies", "combined", "point_inertia(com - centre, m)", "0.0", "Steiner's part is forgotten"),
-    ("outside.as_it_runs", "compared", "max(size(mine[name]), PASSING * peaks[name])", "peaks[name]",
+    ("outside.as_it_runs", "compared", "PASSING * peaks[name]", "peaks[name]",
      "a difference is beside the largest of all steps"),
     ("outside.as_it_runs", "one_run", "mujoco.mj_resetDataKeyframe(*_1)", "None", "a run begins at qpos0"),
     ("outside.as_it_runs", "fields", "sorted(contacts_of(d))", "list(contacts_of(d))", "contacts in another order differ"),
