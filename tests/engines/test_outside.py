@@ -22,9 +22,11 @@ ROBOTS = [
     *(ROOT / f"tests/models/{name}.xml" for name in ("arm7", "quadruped", "pendulum_ball")),
 ]
 BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
-PENDULUM = f"""<mujoco model="m"><option gravity="0 0 -9.81"/><worldbody><body name="upper"><joint name="hip" axis="0 1 0" damping="0.1"/>
+PENDULUM = f"""<mujoco model="m"><option gravity="0 0 -9.81"/><worldbody><body name="upper">
+<joint name="hip" axis="0 1 0" damping="0.1"/>
 {BODY.format("0 0 -0.5", 2, "0.25 0.2 0.1")}</body></worldbody></mujoco>"""
-TWO_LINKS = f"""<mujoco model="m"><option gravity="1 2 -9.81"/><worldbody><body name="upper"><joint name="hip" axis="0 1 0" armature="0.01"/>
+TWO_LINKS = f"""<mujoco model="m"><option gravity="1 2 -9.81"/><worldbody><body name="upper">
+<joint name="hip" axis="0 1 0" armature="0.01"/>
 {BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}<body name="lower" pos="0 0 -1"><joint name="knee" axis="0 1 0"/>
 {BODY.format("0 0 -0.5", 1, "0.1 0.1 0.01")}</body></body></worldbody></mujoco>"""
 
