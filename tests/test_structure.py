@@ -16,7 +16,7 @@ DIAGRAM = re.compile(r"^  (\S+) --> (\S+)$", re.MULTILINE)
 
 # the modules of compare, or beginnings of their names, that may import a library
 LIBRARIES = {
-    "mujoco": "engines.mujoco engines.mjx engines.warp engines.outside.as_it_runs stability",
+    "mujoco": "engines.mujoco engines.mjx engines.newton engines.warp engines.outside.as_it_runs stability",
     "mujoco_warp": "engines.warp", "warp": "engines.newton engines.warp",
     "jax": "engines.mjx export.programs", "heyoka": "engines.heyoka",
     "newton": "engines.newton", "pinocchio": "engines.pinocchio", "pydrake": "engines.drake", "pandas": "report",
