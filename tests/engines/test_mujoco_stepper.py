@@ -159,6 +159,19 @@ def test_differences_are_those_of_plain_steps_from_states_beside_one_or_two(inte
         assert np.allclose(A[: len(exact), 0], exact, atol=1e-10)
 
 
+@pytest.mark.parametrize("name", ["quadruped", "mixed"])
+def test_steps_from_states_beside_give_what_mjd_transition_fd_gives(name):
+    """With quaternions, contacts and speeds: movements are those from one end to the other, in the axes there."""
+    model, data = plain(name, 0.004, "Euler")
+    start, A = state_of(model, data), np.zeros((2 * model.nv + model.na,) * 2)
+    mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)
+    stepper = Stepper(model, 0.004, "Euler")
+    assert np.array_equal(stepper.derivative(start, 1e-6)[0], A)
+    ends = [[stepper.after(start, sign * 1e-6 * by) for sign in (-1.0, 1.0)] for by in np.eye(len(A))]
+    columns = [stepper.deviation(*pair) / 2e-6 for pair in ends]
+    assert np.allclose(np.transpose(columns), A, atol=1e-9)
+
+
 def test_differences_are_one_sided_at_the_end_of_a_range():
     """A muscle's activation is never below 0, a control never above its range."""
     muscle = '<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/><motor joint="j" ctrlrange="-1 1"/>'

@@ -17,7 +17,6 @@ from .locked import Positions, compiled, compiled_without, delete_geoms, delete_
 from .motion import Use, joints
 from .names import bit, element_name, kind_of, parts_of
 from .source import Source, delete_textures, is_from_geoms, without_visuals
-from .variants import of_base
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
@@ -181,8 +180,11 @@ FREE: dict[str, Edit] = {
 
 
 def tied_joints(model: mujoco.MjModel) -> list[list[str]]:
-    """The joints that can be locked, those tied by a tendon or an equality together; not a free base."""
-    names, base = list(joints(model)), set(model.dof_jntid[of_base(model)].tolist())
+    """The joints that can be locked, those tied by a tendon or an equality together; not the free
+    joint that carries most mass."""
+    names = list(joints(model))
+    free = [joint for joint in range(model.njnt) if kind_of(model, joint) == "free"]
+    base = max(free, key=lambda joint: model.body_subtreemass[model.jnt_bodyid[joint]], default=-1)
     together = [joints_of(model, tendon) for tendon in range(model.ntendon)]
     for tie in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
         ends = (model.eq_obj1id[tie], model.eq_obj2id[tie])
@@ -192,7 +194,7 @@ def tied_joints(model: mujoco.MjModel) -> list[list[str]]:
         ties[np.ix_(numbers, numbers)] = 1.0
     count, labels = connected_components(ties, directed=False)
     groups = [np.flatnonzero(labels == label).tolist() for label in range(count)]
-    return [[names[number] for number in group] for group in groups if not base.intersection(group)]
+    return [[names[number] for number in group] for group in groups if base not in group]
 
 
 def joints_of(model: mujoco.MjModel, tendon: int) -> list[int]:
