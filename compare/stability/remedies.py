@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import mujoco
-import numpy as np
 
 from ..engines.mujoco import changes
 from ..engines.mujoco.stepper import Stepper
@@ -31,19 +30,10 @@ class Remedy(NamedTuple):
     times: tuple[float, float] | None = None
 
 
-def with_more_armature(model: mujoco.MjModel, more: float) -> mujoco.MjModel | None:
-    """With more armature, kg m2 or kg, at each joint that is not free."""
-    is_free = model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE
-    if is_free.all():
-        return None
-    added = np.where(is_free, 0.0, more)
-    return changes.changed(model, dof_armature=model.dof_armature + added, dof_M0=model.dof_M0 + added)
-
-
 # strengths: the first that is tried, and the most; the least that holds is sought
 STRENGTHS: dict[str, tuple[Change, float, float]] = {
     "less_kv": (lambda model, fold: changes.with_kv(model, 1.0 / fold), 1.5, 1e3),
-    "armature": (with_more_armature, 1e-3, 10.0),
+    "armature": (changes.with_armature, 1e-3, 10.0),
     "slower_contacts": (changes.with_slower_contacts, 1.5, 30.0),
     "impratio": (changes.with_impratio, 2.0, 1e3),
 }

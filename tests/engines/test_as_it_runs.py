@@ -116,7 +116,9 @@ def test_the_mean_of_stages_in_qacc_is_no_difference(integrator, differs, file):
             return data
 
     path = file().path
-    path.write_text(path.read_text().replace("<option", f'<option integrator="{integrator.replace("EULER", "Euler")}"'))
+    path.write_text(
+        path.read_text().replace("<option", f'<option integrator="{integrator.replace("EULER", "Euler")}"')
+    )
     made = run(LastStage, "float32", File(path, (), ()))
     assert (made.first is not None) == differs and (not differs or made.first.field == "qacc")
 
@@ -178,7 +180,18 @@ def test_an_engine_runs_a_file_nearly_as_mujoco_does_once_its_solver_has_converg
     of = Outside(engine).of(compared_with("model", str(path)).robot.case())
     first, last = (of.ask(answers.run_as_it_is, iterations) for iterations in (None, 100))
     assert (first.first.field == "efc_force" and last.over < 1e-2 * first.over) or engine == "newton"
-    same = "xpos", "M", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "contacts", "dist", "efc_J", "efc_aref", "qacc_smooth"
+    same = (
+        "xpos",
+        "M",
+        "qfrc_bias",
+        "qfrc_passive",
+        "qfrc_actuator",
+        "contacts",
+        "dist",
+        "efc_J",
+        "efc_aref",
+        "qacc_smooth",
+    )
     assert max(last.largest[name] for name in (*same, "efc_force")) < BEYOND["float32"]
     assert last.apart[100] < 1e-4 or engine == "newton"
     assert RECORDS[engine].precision == "float32"

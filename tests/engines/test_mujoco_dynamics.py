@@ -4,13 +4,9 @@ import mujoco as plain
 import numpy as np
 import pytest
 from crane import crane
-from files import case_of
-from models import PATHS
-from trees import random_states
 
 import tmt
 from compare.engines.mujoco import calls, engine, parse, read
-from compare.engines.mujoco.calls import left_to_itself, transition
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
@@ -24,9 +20,6 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
     dynamics, (q, v, tau), dt = parse(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
     ours, motion = tmt.simulate(q, v, tau, dt, 5, "rk4", case.tree), dynamics.run(q, v, tau, dt, 5, "RK4")
     assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
-    alone = left_to_itself(dynamics, q, v, tau, dt, 5, "Euler")
-    motion = dynamics.run(q, v, tau, dt, 5, "Euler")
-    assert np.allclose(alone["q"], motion.q, atol=1e-13) and np.allclose(alone["qd"], motion.v, atol=1e-12)
     compiled, stated = parameters(dynamics), stated_of_hinges(case.tree)
     for name in compiled.keys() & stated.keys():
         assert np.allclose(compiled[name], stated[name], atol=1e-14), name
@@ -45,21 +38,6 @@ def test_a_loop_repeats_its_calls_at_a_state(mujoco, rng):
         data.qacc[:] = 0.0
         loops["MuJoCo, mj_forward"](1)
         assert np.allclose(data.qacc, dynamics.acceleration(q, v, nothing), rtol=1e-12)
-
-
-def test_a_step_is_differenced_in_movements(rng):
-    reading = read(PATHS["mixed"])  # with quaternions
-    dynamics, (q, _, tau) = engine(reading).of(case_of(reading.tree)), random_states(rng, reading.tree, 1)
-    for integrator in ("Euler", "implicit"):
-        stepper = dynamics.stepper(1e-3, integrator)
-        model, data = stepper.model, stepper.put(dynamics.states(stepper, q[0], 0.0, tau[0])[1][0])
-        A = np.zeros((2 * model.nv + model.na,) * 2)
-        calls.mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)
-        order = np.concatenate([dynamics.dofs, model.nv + dynamics.dofs])
-        found = transition(dynamics, q[0], tau[0], 1e-3, integrator)
-        assert np.allclose(A[np.ix_(order, order)], found, atol=1e-6)
-    found = transition(dynamics, q[0], tau[0], 1e-9, "RK4")
-    assert np.allclose(found, np.eye(2 * len(dynamics.dofs)), atol=1e-5)
 
 
 def test_forces_of_a_fluid_are_those_of_plain_mujoco(rng):

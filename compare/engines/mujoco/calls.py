@@ -7,7 +7,6 @@ import ctypes
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,7 +16,6 @@ from tmt.compiled.machine import Library
 from .dynamics import Array, MujocoDynamics
 from .names import bit
 
-NUDGE = 1e-6  # of central differences, rad and rad/s
 Call = Callable[[], np.ndarray]
 Run = Callable[[int], np.ndarray]  # how many times
 
@@ -71,27 +69,6 @@ def of_steps(
         return moved.T / ((1 + centred) * eps)
 
     return call
-
-
-def transition(dynamics: MujocoDynamics, q: Array, tau: Array, dt: float, integrator: str) -> np.ndarray:
-    """d(movement, speed)+/d(movement, speed) of a step at rest, (2 nv, 2 nv); q: (nq,), tau: (nv,)."""
-    n = len(dynamics.dofs)
-    return of_steps(dynamics, q, np.zeros(n), tau, dt, integrator, True, NUDGE)()[:, : 2 * n]
-
-
-def left_to_itself(
-    dynamics: MujocoDynamics, q: Array, qd: Array, tau: Array, dt: float, steps: int, integrator: str
-) -> dict[str, Any]:
-    """A run with MuJoCo's automatic reset: its clock's time (steps + 1,) s, q, qd; number of warnings."""
-    stepper = dynamics.stepper(dt, integrator)
-    model, data = stepper.model, stepper.put(dynamics.states(stepper, q, qd, tau)[1][0])
-    model.opt.disableflags &= ~bit("AUTORESET")
-    path = [(0.0, q, qd)]
-    for _ in range(steps):
-        mujoco.mj_step(model, data)
-        path.append((data.time, data.qpos[dynamics.qpos], data.qvel[dynamics.dofs]))
-    time, positions, speeds = map(np.array, zip(*path))
-    return {"time": time, "q": positions, "qd": speeds, "warnings": int(data.warning.number.sum())}
 
 
 def library() -> str | None:

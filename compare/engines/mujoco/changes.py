@@ -26,17 +26,15 @@ def changed(model: mujoco.MjModel, **numbers: ArrayLike) -> mujoco.MjModel:
     return copy
 
 
-def with_armature(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
-    """With more armature at each hinge and slide: a factor times the least inertia of it at qpos0, 1 / (M^-1)_ii.
+def with_armature(model: mujoco.MjModel, more: float) -> mujoco.MjModel | None:
+    """With more armature, kg m2 or kg, at each joint that is not free; None: all are free.
 
     Of bodies whose inertia never changes the compiler keeps it ready in dof_M0, which therefore changes too.
     """
-    more = factor / np.maximum(model.dof_invweight0, mujoco.mjMINVAL)
-    kinds = model.jnt_type[model.dof_jntid]
-    more[(kinds == mujoco.mjtJoint.mjJNT_FREE) | (kinds == mujoco.mjtJoint.mjJNT_BALL)] = 0.0
-    if not more.any():
+    added = np.where(model.jnt_type[model.dof_jntid] == mujoco.mjtJoint.mjJNT_FREE, 0.0, more)
+    if not added.any():
         return None
-    return changed(model, dof_armature=model.dof_armature + more, dof_M0=model.dof_M0 + more)
+    return changed(model, dof_armature=model.dof_armature + added, dof_M0=model.dof_M0 + added)
 
 
 def with_kv(model: mujoco.MjModel, factor: float) -> mujoco.MjModel | None:
@@ -90,25 +88,6 @@ def with_noslip(model: mujoco.MjModel, count: int) -> mujoco.MjModel:
 def with_impratio(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
     """With a factor times the ratio of frictional to normal impedance of contacts."""
     return changed(model, impratio=factor * model.opt.impratio)
-
-
-def with_other_cone(model: mujoco.MjModel) -> mujoco.MjModel:
-    """With elliptic friction cones for pyramidal ones, or the other way."""
-    return changed(model, cone=1 - model.opt.cone)
-
-
-def without_contacts(model: mujoco.MjModel) -> mujoco.MjModel | None:
-    """Without any contact; None: the file has them disabled."""
-    flags = model.opt.disableflags
-    return None if flags & bit("CONTACT") else changed(model, disableflags=flags | bit("CONTACT"))
-
-
-def with_exact_solver(model: mujoco.MjModel) -> mujoco.MjModel:
-    """With forces of constraints that are exact to rounding, by Newton's method, and zones that are kept."""
-    return changed(
-        model, solver=mujoco.mjtSolver.mjSOL_NEWTON, tolerance=1e-15, iterations=200, ls_iterations=100,
-        disableflags=model.opt.disableflags | bit("ISLAND"),
-    )  # fmt: skip
 
 
 class Program(NamedTuple):

@@ -63,13 +63,6 @@ def geom_name(m: mujoco.MjModel, geom: Integer) -> str:
     return m.geom(int(geom)).name or f"a geom of {bearer}"
 
 
-def contact_name(m: mujoco.MjModel, d: mujoco.MjData, number: int) -> str:
-    """The two geoms of a contact of the data, or their bodies where they have no names."""
-    geoms = d.contact.geom[number].tolist()
-    names = [m.geom(geom).name or element_name(m, "body", m.geom_bodyid[geom]) for geom in geoms]
-    return " on ".join(dict.fromkeys(names))
-
-
 def names_where(m: mujoco.MjModel, field: str, holds: np.ndarray) -> list[str]:
     """The names of the elements (of speeds: the joints) for which something holds in their row of a field."""
     prefix, rows = field.partition("_")[0], np.flatnonzero([row.any() for row in holds])

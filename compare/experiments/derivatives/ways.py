@@ -20,7 +20,6 @@ from ...engines.mujoco import Mujoco
 from ...engines.mujoco.calls import Call, of_inverse, of_steps, of_transition
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.engine import methods_for
-from ...engines.mujoco.step import takes_transition
 from ...judge.agree import share_of
 from ...judge.entries import Entries
 from ...judge.rounding import LEFT_OUT, of_positions
@@ -148,7 +147,7 @@ class Quantity(NamedTuple):
             call = partial(of_inverse, dynamics, q, qd, accelerations(subject)[k])
             return [Way(BY_INVERSE, False, call)]
         functions, ways = {BY_STEPS: of_steps} if self.integrator else {}, []
-        if functions and takes_transition(dynamics.model, self.integrator):
+        if functions and dynamics.stepper(dt, self.integrator).takes_transition:
             functions = {TRANSITION: of_transition} | functions
         for side, (name, function) in product((ONE_SIDED, CENTRED), functions.items()):
             state = dynamics, q, qd, subject.tau[k], dt, self.integrator, side == CENTRED

@@ -24,5 +24,8 @@ EDITS = (
     ("mujoco.stepper", "Stepper.derivative", "behind[ahead > 0.0] *= centred", "pass", "one-sided differences are centred"),
     ("mujoco.changes", "with_kv", "gain[is_velocity_servo, 0] *= factor", "pass", "the target of a velocity servo changes"),
     ("mujoco.changes", "with_kv", "gain[of_gain, 2] *= factor", "pass", "a damper is never cured"),
+    ("mujoco.changes", "with_armature", "model.dof_M0 + added", "model.dof_M0", "a body that never changes stays as it is"),
+    ("mujoco.changes", "program", "np.clip(u, *_1)", "u", "a program has no range of its controls"),
+    ("mujoco.changes", "program", "kv or 0.0", "0.0", "--kv is none"),
     ("mujoco.changes", "with_slower_contacts", "model.opt.enableflags & OVERRIDE", "False", "the options' solref is ignored"),
 )  # fmt: skip
