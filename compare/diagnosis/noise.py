@@ -31,7 +31,9 @@ class Noisy(NamedTuple):
     @property
     def digits(self) -> int:
         """Of the value, as many as its deviation leaves."""
-        return int(np.clip(np.ceil(np.log10(abs(self.value / self.deviation))) + 1, 2, 12)) if self.value else 1
+        return (
+            int(np.clip(np.ceil(np.log10(abs(self.value / self.deviation))) + 1, 2, 12)) if self.value else 1
+        )
 
 
 def through_noise(tree: Tree, values: Values, qdd: ndarray | None = None) -> Noisy | None:

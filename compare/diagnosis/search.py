@@ -12,6 +12,7 @@ from numpy import ndarray
 from tmt import Tree
 
 from ..core.cause import Cause
+from .angles import linearized, orders_of_rotation, other_angles, sums_of_angles
 from .cause import LEAST_STATES, Diagnosis, ranked, together
 from .consistency import follows_from
 from .conventions import Convention, all_conventions, values_in
@@ -20,14 +21,14 @@ from .fit import PROMISING, Fitted, OutOfTime, Search
 from .given import Bias, Given
 from .groups import inertial_numbers, several, vectors
 from .hypothesis import Hypothesis
-from .kinematics import slips_of_kinematics
 from .likelihood import NATURAL, cost, in_part
 from .model import Equations, Values
 from .places import OF_ZERO
 from .recursion import slips_of_recursion
+from .slips import slips_of_kinematics
 from .statements import Stated, Statements
 from .terms import all_places
-from .variants import lagrange, linearized, orders_of_rotation, other_angles, program_options, sums_of_angles
+from .variants import lagrange, program_options
 
 FEW = 2  # states at which conventions are tried first
 TRIED = 3  # states at which other explanations are tried first

@@ -4,18 +4,21 @@ from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, combinations_with_replacement
 
 import numpy as np
+from numpy import ndarray
 
 import tmt
 
-from .kinematics import parts_of_translation
-from .model import MOST_SPEEDS, OF_TERM, Entry, Equations
-from .places import ALL, FIT_ROUNDING, Place, factor, forces, numbers, sets_of_bodies
+from ..core.words import listed
+from .kinematics import SAME, Kinematics
+from .model import MOST_SPEEDS, OF_TERM, TINY, Entry, Equations
+from .places import ALL, FIT_ROUNDING, XYZ, Place, factor, forces, numbers, sets_of_bodies
 
 TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
     "velocity terms of {} in h": ("convective", "Euler", "gyroscopic"),
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
+MOST_ENTRIES = 10  # of Mbar, in which cross terms are tried alone
 
 
 def all_places(equations: Equations) -> list[Place]:
@@ -28,7 +31,7 @@ def all_places(equations: Equations) -> list[Place]:
 # entries of which a factor may be wrong
 
 
-def unit_columns(equations: Equations) -> dict[str, np.ndarray]:
+def unit_columns(equations: Equations) -> dict[str, ndarray]:
     """The values of 1 in an entry of Mbar, a row of h at rest, a coefficient of speeds in h, by names."""
     layout, (M, velocity_terms, rest), columns = equations.layout, equations.parts, {}
     for entry in equations.coefficients if equations.nv <= MOST_SPEEDS else ():
@@ -129,7 +132,7 @@ def coefficients(equations: Equations) -> Iterator[Place]:
     if equations.nv > MOST_SPEEDS:
         return
 
-    def place(name: str, terms: list[tuple[Entry, np.ndarray]]) -> Place:
+    def place(name: str, terms: list[tuple[Entry, ndarray]]) -> Place:
         """The factor of some velocity terms."""
         column = sum(values[:, None] * units[entry.named(equations.speeds)] for entry, values in terms)
         return factor("coefficient", name, column + 0.0 * right)
@@ -151,3 +154,47 @@ def coefficients(equations: Equations) -> Iterator[Place]:
         moved[:, i] = rest[:, j]
         name = f"gravity of h[{equations.speeds[j]}] in h[{equations.speeds[i]}]"
         yield factor("coefficient", name, layout.packed(0.0 * M, 0.0 * rest, moved), stated=0.0)
+
+
+def parts_of_translation(equations: Equations) -> Iterator[Place]:
+    """Factors in v^2 of a body's CoM, and the mass with which it moves along some axes.
+
+    v is the sum of those of its segments, v^2 of their squares and products: in all, in an entry of Mbar.
+    """
+    if equations.nv > MOST_SPEEDS:
+        return
+    kinematics, layout, tree, nv = Kinematics(equations), equations.layout, equations.tree, equations.nv
+    entries = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]]
+
+    def column(
+        mass: float, pairs: list[tuple[ndarray, ndarray]], gravity: ndarray, lifted: ndarray | None = None
+    ) -> ndarray:
+        n, M, h = len(equations.q), 0.0 * equations.parts[0], 0.0 * equations.qd
+        lifted = pairs[0][0] if lifted is None else lifted
+        for J, other in pairs:
+            a = np.einsum("vsc,sv->sc", other[:, -n:].imag / TINY, equations.qd)
+            M = M + mass * np.einsum("vsc,wsc->svw", J[:, :n].real, other[:, :n].real)
+            h = h + mass * np.einsum("vsc,sc->sv", J[:, :n].real, a)
+        return layout.packed(M, h, -mass * np.einsum("vsc,c->sv", lifted[:, :n].real, gravity))
+
+    for b in (b for b, joint in enumerate(tree.body_joint) if joint >= 0):
+        body, mass, segments = tree.body_names[b], float(tree.mass[b]), kinematics.segments(b)
+        pairs = combinations_with_replacement(segments, 2) if len(segments) > 1 else ()
+        for first, second in pairs:
+            both = [(first.jacobian, second.jacobian), (second.jacobian, first.jacobian)]
+            added = column(mass, both if first is not second else both[:1], np.zeros(3))
+            name = f"2 ({first.name}) * ({second.name}) in v^2 of {body}"
+            name = f"({first.name})^2 in v^2 of {body}" if first is second else name
+            yield factor("part", name, added)
+            if first.slides and first is not second:
+                moment = added + column(mass, [], np.array(tree.gravity), second.jacobian)
+                yield factor("part", f"mass of {body} times ({second.name}) along {first.name}", moment)
+            active = np.abs(added[:, layout.in_M]).max(axis=0) > SAME * np.abs(added).max()
+            for k in np.flatnonzero(active).tolist() if len(entries) <= MOST_ENTRIES else ():
+                yield factor("part", f"{name} in {entries[k]}", added, [k])
+        chosen = [np.isin(range(3), axes) for count in (1, 2) for axes in combinations(range(3), count)]
+        for axes in chosen if mass and nv > 1 else ():
+            J = kinematics.J[b] * axes
+            along = listed([XYZ[k] for k in np.flatnonzero(axes)])
+            added = column(1.0, [(J, J)], np.array(tree.gravity) * axes)
+            yield Place("part", f"mass of {body} along {along}", mass, "kg", mass, column=added, least=0.0)

@@ -10,10 +10,10 @@ import tmt
 from compare.diagnosis import Stated, Values, diagnose
 from compare.diagnosis.conventions import all_conventions
 from compare.diagnosis.groups import is_round
-from compare.diagnosis.kinematics import slips_of_kinematics
 from compare.diagnosis.likelihood import NATURAL, cost
 from compare.diagnosis.model import Equations, Layout
 from compare.diagnosis.recursion import SLIPS, evaluated, slips_of_recursion
+from compare.diagnosis.slips import slips_of_kinematics
 from compare.engines.mujoco import reading, tree_with_sites
 from compare.robots.coordinates import Coordinates
 from compare.robots.joint_map import joint_map

@@ -154,7 +154,8 @@ def test_a_mass_matrix_is_symmetric_within_the_scale_of_each_entry(share, passes
 
 
 @pytest.mark.parametrize("rows, top", [
-    ([(1.0, 0.2), (1.0, 0.7), (1.0, 0.4)], 1), ([(1.0, 0.9), (None, None)], 1), ([(1.0, None), (1.0, 0.1)], 1), ([(1.0, None)], None),
+    ([(1.0, 0.2), (1.0, 0.7), (1.0, 0.4)], 1), ([(1.0, 0.9), (None, None)], 1), ([(1.0, None), (1.0, 0.1)], 1),
+    ([(1.0, None)], None),
 ])  # fmt: skip
 def test_the_headline_has_the_largest_share_and_what_is_no_number_first(rows, top):
     result = Result("mass")

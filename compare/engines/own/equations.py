@@ -1,9 +1,8 @@
 """A user's equations, evaluated at states of the model's joints; their errors are collected."""
 
 import time
-import warnings
 from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from contextlib import nullcontext
 
 import numpy as np
 from numpy import ndarray
