@@ -102,10 +102,10 @@ def drawn(run: Run, label: str) -> Iterator[Image.Image]:
     lines = [ax.plot([], [], label=name, **look)[0] for name, look in zip(names, LOOKS)]  # type: ignore[arg-type]
     slower = MILLISECONDS / 1e3 / float(t[1] - t[0])
     method = f"{run.integrator}, {step_in_words(case, run.steps)}"
-    figure.text(0.02, 0.93, case.name, fontsize=14)
+    figure.text(0.02, 0.93, case.name, fontsize=14, parse_math=False)  # a name is no formula
     figure.text(0.02, 0.87, said("run", run=method, slower=1.0 if 0.9 < slower < 1.1 else slower))
     figure.legend(loc="upper right", ncols=2, markerscale=0.5)
-    status = figure.text(0.02, 0.04, "")
+    status = figure.text(0.02, 0.04, "", parse_math=False)
     canvas.draw()
     background = canvas.copy_from_bbox(
         figure.bbox
