@@ -3,7 +3,7 @@
 import numpy as np
 from numpy import ndarray
 
-from tmt import Tree
+from tmt import Tree, acceleration
 from tmt.literal import gather
 from tmt.methods import METHODS, Linearized, amplification
 from tmt.methods.stepping import Method
@@ -75,6 +75,18 @@ def of_positions(tree: Tree, q: ndarray) -> ndarray:
         if joint.kind != "ball":
             sizes[:, joint.qd] = np.abs(q[:, joint.q])
     return sizes
+
+
+def of_a_step(tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, A: ndarray) -> ndarray:
+    """The sizes of which a step has 64 eps of rounding, there and carried through it by A: (states, 2 nv, 1).
+
+    Of a difference of steps that is over the eps of the difference; a ball's turn is a quaternion.
+    """
+    entries, qdd = Entries(tree, q, qd), acceleration(q, qd, tau, tree)
+    force = entries.force(tau) + gain_scale(tree, q, qd)
+    rates = np.abs(qd) + dt * entries.acceleration(force, qdd)
+    sizes = np.concatenate([of_positions(tree, q) + dt * rates, rates], axis=1)[:, :, None]
+    return np.asarray(sizes + np.abs(A) @ sizes)
 
 
 def band(

@@ -1,152 +1,166 @@
-"""Derivatives by differences and exact ones: what is advised, and that a wrong model is found."""
+"""Derivatives: the eps that is advised, errors by blocks, a wrong model, contacts and limits, what no control moves."""
 
-import dataclasses
+from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
+from edited import XML, edited, setup_between, setup_of, setup_of_file
+from servo_models import hinge
 
 import tmt
-from compare.core.finding import Finding
-from compare.core.text import say
+from compare.core.text import say, screen
 from compare.engines.mujoco import read
-from compare.experiments.derivatives import add_advice, contact_rows, of_mujoco, subjects, ways
+from compare.experiments import derivatives
+from compare.experiments.derivatives import standing, ways
 from compare.experiments.derivatives.figures_derivatives import draw_errors
-from compare.experiments.derivatives.ways import CostRow, DerivativeRow, worst_of_each_eps
-from compare.robots.arm import ARM
-from compare.robots.states import Sample
-
-DT = 0.01
+from compare.experiments.derivatives.standing import Standing, directions, errors_of, not_moved
 
 
-@pytest.fixture(scope="module")
-def bent():
-    return subjects.along(next(case for case in ARM.cases if case.name == "bent, damped"), 2)
+def failed(result) -> list[str]:
+    return [check.quantity for check in result.checks if not check.passed]
 
 
-def shares(mujoco, subject, *integrators, compiles=False) -> dict[str, float]:
-    every = ways.measured(ways.Task(subject, integrators, compiles), mujoco, DT)
-    return {way: share for one in every for way, share in one.shares.items()}
+def answered(xml):
+    return derivatives.rows(replace(setup_of_file(xml), alone=True))
 
 
-def test_centred_differences_are_more_exact_than_one_sided_ones_and_exact_derivatives_than_both(small):
-    result = small("derivatives")
-    for row in result.tables["derivative_costs"]:
-        seconds = result.times.get((row.quantity, row.way))
-        assert row.time == (None if seconds is None else pytest.approx(1e6 * seconds))
-    values = result.top[0].values
-    centred, usual = values["centred"], values["usual"]
-    assert 1e-7 < centred.eps < 1e-3 and 1e-12 < centred.error < 1e-8 and usual.eps == 1e-6
-    assert usual.error > 30 * centred.error and values["one_sided"].error > 10 * centred.error
-    assert 1e-10 < values["inverse"].error < 1e-5 and values["exact"].error < 1e-12
-    values = {**values, "centred": dataclasses.replace(centred, eps=1e-5, unit="m per N", largest=3.0)}
-    said = say(Finding("derivatives", "advice", values))
+@pytest.mark.parametrize("errors, eps, alike", [
+    ({1e-1: 1.0, 1e-2: 1e-3, 1e-3: 1e-6, 1e-4: 1e-3}, 1e-3, (1e-3, 1e-3)),
+    ({1e-1: 1.0, 1e-2: 2.99e-6, 1e-3: 1e-6, 1e-4: 2.99e-6, 1e-5: 1.0}, 1e-3, (1e-4, 1e-2)),
+    ({1e-1: 1.0, 1e-2: 3.01e-6, 1e-3: 1e-6, 1e-4: 3.01e-6, 1e-5: 1.0}, 1e-3, (1e-3, 1e-3)),
+    ({1e-1: 2e-6, 1e-2: 1.5e-6, 1e-3: 2.5e-6, 1e-4: 1e-6, 1e-5: 1.0}, 1e-2, (1e-4, 1e-1)),  # the better of two middles
+    ({1e-1: 1e-6, 1e-2: 1.0, 1e-3: 1.1e-6}, 1e-1, (1e-1, 1e-1)),  # alike, but no neighbours
+    ({1e-1: None, 1e-2: 1.0, 1e-3: None}, 1e-2, (1e-2, 1e-2)),
+])  # fmt: skip
+def test_the_middle_of_a_plateau_is_advised(errors, eps, alike):
+    best = ways.best_of("way", errors)
+    assert (best.eps, best.finest_alike, best.coarsest_alike) == (eps, *alike)
+    assert best.error == errors[eps]
+
+
+def test_an_error_is_that_of_the_largest_entry_of_its_block():
+    """Of two joints and an input: blocks of 2 x 2 and 2 x 1."""
+    exact = np.array([[1.0, 1e-3, 2e-3, 0.0, 1e-6], [0.0, 1.0, 0.0, 2e-3, 2e-6],
+                      [5.0, 0.0, 1.0, 0.0, 1e-3], [0.0, 1e-9, 0.0, 0.5, 0.0]])  # fmt: skip
+    for (row, column), block, size in (
+        ((0, 0), "dq/dq", 1.0), ((0, 3), "dq/dv", 2e-3), ((3, 1), "dv/dq", 5.0), ((3, 3), "dv/dv", 1.0),
+        ((0, 4), "dq/du", 2e-6), ((3, 4), "dv/du", 1e-3),
+    ):  # fmt: skip
+        difference = np.zeros_like(exact)
+        difference[row, column] = 1e-8
+        assert ways.worst_block(difference, exact, 2) == (pytest.approx(1e-8 / size), block)
+    zero, rounding = np.where(np.abs(exact) < 1e-5, 0.0, exact), np.full_like(exact, 1e-5)
     assert (
-        "(A and B; mjd_transitionFD does not take it): use eps 1e-05, centred" in said
-        and "m per N, of 3)" in said
-    )
-    assert "contacts left out: use" in say(Finding("derivatives", "advice", values | {"in_air": True}))
+        ways.worst_block(np.full_like(exact, 1e-8), exact, 2, rounding)[1] == "dv/du"
+    )  # dq/du is but rounding
+    assert ways.worst_block(np.full_like(exact, 1e-8), zero, 2)[1] == "dv/du"
+    assert ways.worst_block(np.nan * exact, exact, 2)[0] == np.inf
 
 
-def row(quantity="A and B, Euler", **values) -> DerivativeRow:
-    about = {"subject": "swing", "states": 1, "unit": "rad per rad", "largest": 1.0}
-    return DerivativeRow(quantity=quantity, **(about | values))
+def test_the_answer_of_the_arm(small):
+    """Of RK4, which mjd_transitionFD refuses: differences of steps have their best error where both terms meet."""
+    result = small("derivatives")
+    assert failed(result) == []
+    centred, one_sided, exact = result.tables["derivative_costs"]
+    assert centred.way == "differences of mj_step, centred" and 1e-7 < centred.eps < 1e-3
+    assert 1e-12 < centred.error < 1e-8 and 10.0 * centred.error < one_sided.error and exact.error < 1e-12
+    assert all(row.time > 0.0 for row in (centred, one_sided, exact))
+    lines = screen(result.top[0])
+    assert len(lines) <= 7 and "does not take this integrator" in lines[-1]
+    errors = {row.eps: row.error for row in result.rows if row.way == centred.way}
+    assert min(errors, key=errors.get) == centred.eps and len(errors) == len(ways.SIZES)
+    assert draw_errors(result)[0] == "derivatives_errors"
 
 
-@pytest.mark.parametrize("integrator, eps, way, steps", [
-    ("Euler", 1e-4, "mjd_transitionFD", 1e-3), ("implicit", 1e-6, "mjd_transitionFD", 1e-5),
-    ("RK4", 1e-3, "differences of mj_step", None),
-])  # fmt: skip
-def test_the_eps_is_that_of_mujocos_own_function_and_of_the_files_integrator(integrator, eps, way, steps):
-    """Each way has an eps of its own, a hundred times better than the others; differences of mj_step are worse."""
-    best = {"Euler": (1e-4, 1e-3), "implicit": (1e-6, 1e-5), "RK4": (None, 1e-3)}
-    rows = [row(ways.INVERSE, way=ways.BY_INVERSE, eps=at, error=1e-5) for at in ways.SIZES]
-    rows += [row(ways.INVERSE, way=ways.NUMPY, eps=None, error=1e-15)]
-    for name, of_ways in best.items():
-        for by, at in zip((ways.TRANSITION, ways.BY_STEPS), of_ways):
-            least = 1e-10 if by == ways.TRANSITION else 1e-8
-            for side, larger in ((ways.CENTRED, 1.0), (ways.ONE_SIDED, 10.0)):
-                errors = {size: larger * least * (1.0 if size == at else 100.0) for size in ways.SIZES}
-                rows += [row(f"A and B, {name}", way=f"{by}, {side}", eps=size, error=error)
-                         for size, error in errors.items() if at]  # fmt: skip
-    result = ways.DerivativesResult("derivatives", rows=rows)
-    add_advice(result, rows, [], integrator, False)
-    said = say(result.top[0])
-    assert f"steps with {integrator} by {way} (A" in said and f": use eps {eps:.1g}, centred" in said
-    assert ("By differences of mj_step (A and B), centred: eps" in said) == (steps is not None)
-    assert steps is None or f"centred: eps {steps:.1g}, 1e-08" in said
-    assert say(result.headline).endswith(f"({way}, {integrator})")
-    *_, caption = draw_errors(result)
-    assert f"a step with {integrator} and of the inverse dynamics, the largest at 1 state (swing: 1)" in say(
-        caption
-    )
-    drawn = worst_of_each_eps(line for line in result.drawn if line.way == f"{way}, centred")
-    assert min(drawn, key=lambda size: drawn[size].size) == eps  # as the figure has it
+GEAR = (
+    hinge(kp=20.0, kv=0.5)
+    .replace('kv="0.5"', 'kv="0.5" gear="3"')
+    .replace("<option ", '<option integrator="{}" ')
+)
 
 
-def test_a_wrong_damper_is_seen_in_the_centred_differences(mujoco, bent):
-    assert max(shares(mujoco, bent, "Euler", "RK4").values()) <= 1.0
-    damping = tuple(x + 1e-8 for x in bent.tree.damping)
-    wrong = bent._replace(tree=dataclasses.replace(bent.tree, damping=damping))
-    found = shares(mujoco, wrong, "implicitfast", "RK4")
-    assert all(share > 1.0 for way, share in found.items() if way.endswith("centred"))
-    assert found[ways.NUMPY] <= 1.0  # of its own model they are exact
+@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
+def test_b_is_by_control_with_the_gear(integrator):
+    """A hinge of 0.05 kg m2 with a servo of kp 20, kv 0.5 at a gear of 3: its step is linear, so all eps are alike."""
+    setup = setup_of_file(GEAR.format(integrator))
+    subject = ways.Subject(setup.engines["mujoco"], ways.case_of(setup.robot), 0.002, integrator, 2)
+    assert subject.by == "ctrl" and subject.gains == pytest.approx(np.full((2, 1, 1), 60.0))
+    dt, k, d, inertia = 0.002, 9.0 * 20.0, 9.0 * 0.5, 0.05
+    inertia += dt * d * (integrator == "implicitfast")
+    by = np.array([-k, -d, 60.0]) * dt / inertia
+    speed = np.array([0.0, 1.0, 0.0]) + by
+    expected = np.array([np.array([1.0, 0.0, 0.0]) + dt * speed, speed])
+    assert subject.exact == pytest.approx(np.tile(expected, (2, 1, 1)), rel=1e-12)
+    assert subject.by_differences(1e-4, True) == pytest.approx(subject.exact, rel=1e-8)
+    result = answered(GEAR.format(integrator))
+    assert failed(result) == [] and result.tables["derivative_costs"][0].error < 1e-10
 
 
-@pytest.mark.parametrize("way, owner, name", [
-    (ways.NUMPY, ways.Quantity, "by_numpy"), (ways.COMPILED, ways.Evaluator, "of_rows"),
-])  # fmt: skip
-def test_a_wrong_derivative_is_seen_entry_by_entry(mujoco, bent, monkeypatch, way, owner, name):
-    right = getattr(owner, name)
-
-    def wrong(self, *arguments):
-        values = right(self, *arguments)
-        values.reshape(len(values), -1)[0, 1] += 1e-9
-        return values
-
-    monkeypatch.setattr(owner, name, wrong)
-    assert shares(mujoco, bent, "Euler", compiles=True)[way] > 1.0
+MOTORS = """<mujoco><option integrator="Euler"/><worldbody><body><joint name="hip" axis="0 1 0"/>
+<geom size="0.1 0.05" type="capsule" pos="0.1 0 0.2"/>
+<body pos="0 0 0.5"><joint name="knee" axis="0 1 0.2"/><geom size="0.05" pos="0.2 0 0.1"/></body></body></worldbody>
+<actuator><motor joint="knee" gear="5"/></actuator></mujoco>"""
 
 
-def test_a_block_of_a_step_that_is_as_good_as_zero_is_not_what_an_error_is_relative_to():
-    """Balanced, speeds in units of the robot's own time: an oscillator of 10 rad/s, its step 1 ms, a force of 1 N."""
-    units = np.array(["m", "m/s"]), np.array(["m", "m/s", "N"])
-    exact = np.array([[1.0, 1e-3, 1e-6], [-0.1, 1.0, 1e-3]])
-    sizes = np.array([[1.0, 0.1, 1e-4], [10.0, 1.0, 1e-3]])
-    assert (np.abs(np.log2(ways.sizes(exact, units) / sizes)) < 2.0).all()
-    forces = np.array(["N", "N m"]), units[1]
-    assert (ways.sizes(exact, forces) == np.abs(exact)).all()  # of the inverse dynamics: of the same unit
-    off = np.full((2, 3), 1e-9)
-    assert ways.relative(off, exact, forces)[:2] == (pytest.approx(1e-3), "N per N")
-    rounded = ways.relative(off, exact, forces, least=0.5)  # rounding may have made the others
-    assert rounded == (1e-9, "N per m", 1.0)
-    assert ways.relative(np.nan * off, exact, forces)[0] == np.inf
+def test_a_robot_with_motors_alone_is_set_going_and_moved_by_its_controls():
+    setup = setup_of_file(MOTORS)
+    case = ways.case_of(setup.robot)
+    subject = ways.Subject(setup.engines["mujoco"], case, 0.002, "Euler", 3)
+    assert np.abs(case.v).min() > 0.1 and subject.by == "ctrl" and subject.gains.shape == (3, 2, 1)
+    assert subject.gains == pytest.approx(np.tile([[0.0], [5.0]], (3, 1, 1)))
+    best = answered(MOTORS).tables["derivative_costs"][0]
+    assert 1e-6 < best.eps < 1e-2 and best.error < 1e-7
 
 
-@pytest.mark.parametrize("of_fourth", [8e3, 0.99e6])
-def test_where_two_terms_of_the_truncation_nearly_cancel_another_eps_tells_their_size(bent, of_fourth):
-    """Those in eps^2 and eps^4, at 1e-2 or 1e-3."""
-    *_, step = ways.quantities(bent, ("Euler",))
-    exact = step.exact_values(bent, DT)
-    values = {eps: exact.high + (eps**2 - of_fourth * eps**4) for eps in ways.SIZES}
-    assert 0.3 < ways.share_of_differences(values, exact, bent, step, DT) < 0.6
+def test_a_wrong_damper_and_a_wrong_derivative_are_seen(mujoco, monkeypatch):
+    servo = hinge(kp=20.0, kv=0.5)
+    assert failed(derivatives.rows(setup_between(servo))) == []
+    damped = servo.replace('axis="0 0 1"', 'axis="0 0 1" damping="1e-6"')
+    (wrong,) = failed(derivatives.rows(setup_between(servo, damped)))
+    assert wrong == "mjd_transitionFD, centred, to exact, over its tolerance"
+    right = tmt.step_derivatives
+
+    def with_error(*arguments):
+        A, B = right(*arguments)
+        A[..., 0, 1] += 1e-8
+        return A, B
+
+    monkeypatch.setattr(tmt, "step_derivatives", with_error)
+    assert len(failed(derivatives.rows(setup_of(mujoco)))) == 2
+    heavier = setup_of(edited(('mass="1.5"', 'mass="1.50001"'), text=XML))
+    monkeypatch.setattr(tmt, "step_derivatives", right)
+    assert failed(derivatives.rows(heavier)) == [
+        "differences of mj_step, centred, to exact, over its tolerance"
+    ]
 
 
-def test_tmt_is_compared_with_mujocos_own_centred_function():
-    ways_to_it = "mjd, one-sided", "differences, centred", "mjd, centred", ways.COMPILED
-    costs = [CostRow(quantity="A", way=way, best_eps=None, error=0.0, time=1.0) for way in ways_to_it]
-    assert of_mujoco(costs, "A") is costs[2] and of_mujoco(costs, "B") is None
+def noisy(eps, noise, slope, kink):
+    """A derivative of 2, of a block of one entry, with a term in eps^2, noise of a step, and a kink from an eps on."""
+    rounding = np.random.default_rng(int(1e15 * eps)).uniform(-1.0, 1.0)
+    size = 2.0 + slope * eps**2 + noise / eps * rounding + (np.sqrt(eps / kink) if eps > kink else 0.0)
+    return np.array([[size, 1.0], [1.0, 1.0]])
 
 
-def test_hard_states_are_those_of_critical_dampers_and_of_the_least_definite_matrix(bent):
-    stiff = subjects.stiff(bent, DT)
-    assert min(stiff.tree.stiffness) > 1e3 * DT and stiff.q.shape == (1, 3)
-    damping = DT * np.array(stiff.tree.stiffness)  # 2 / rate, the rate 2 / DT
-    assert stiff.tree.damping == pytest.approx(damping)
-    M = tmt.mass_matrix(bent.q)
-    roots = np.sqrt(np.einsum("sii->si", M))
-    least = np.linalg.eigvalsh(M / (roots[:, :, None] * roots[:, None, :]))[:, 0]
-    (q,) = subjects.near_singular(bent, Sample(bent.tree, "", bent.q, bent.qd, bent.tau, 0)).q
-    assert np.array_equal(q, bent.q[least.argmin()]) and np.ptp(least) > 0.0
+@pytest.mark.parametrize("noise, kink, eps", [(1e-13, 1.0, 1e-5), (1e-13, 1e-6, 1e-6), (1e-9, 1.0, 1e-3)])
+def test_what_agrees_for_neighbouring_eps_is_right(noise, kink, eps):
+    values, halved = ([noisy(size / part, noise, 1e3, kink) for size in ways.SIZES] for part in (1.0, 2.0))
+    errors, truth = errors_of(values, halved, 1)
+    assert truth[0, 0] == pytest.approx(2.0, abs=1e-4 if noise > 1e-12 else 1e-6)
+    found = ways.best_of("", dict(zip(ways.SIZES, errors)))
+    assert eps / 10.1 < found.eps < 10.1 * eps
+    known = [abs(value[0, 0] - 2.0) / 2.0 for value in values]
+    assert all(0.3 < error / right < 3.0 for error, right in zip(errors, known) if right > 1e-4)
+
+
+def test_where_nothing_agrees_no_eps_is_right():
+    rng = np.random.default_rng(0)
+    values = [rng.normal(size=(2, 2)) for _ in ways.SIZES]
+    errors, truth = errors_of(values, values, 1)
+    assert truth is None and set(errors) == {np.inf}
+    about = {"posture": "stand", "contacts": 4, "limits": ["limit of knee"]}
+    told = {"about": about, "best": None, "opened": None, "names": []}
+    assert "no eps is right" in say(derivatives.Result("derivatives").finding("standing", **told))
 
 
 FEET = "".join(
@@ -159,13 +173,94 @@ TABLE = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbo
 </body></worldbody></mujoco>"""
 
 
-def test_contacts_that_open_within_eps_are_named():
-    """A table whose feet sink a fraction of a millimetre into the floor."""
-    rows = contact_rows(read(TABLE))
-    fine, coarse = (next(row for row in rows if row.eps == eps) for eps in (1e-7, 1e-2))
-    assert fine.contacts == 4 and fine.changed == "" and fine.difference < 1e-3
-    assert "floor and knob" in coarse.changed  # which the movement downwards closes
-    assert "floor and foot0" in coarse.changed and not coarse.difference < 10 * fine.difference
-    said = say(Finding("derivatives", "contacts", {"rows": rows}))
-    assert "open or close (floor and foot" in said and "qpos0, where 4 pairs of geoms touch" in said
-    assert contact_rows(read(TABLE.replace('type="plane"', 'type="plane" contype="0" conaffinity="0"'))) == []
+def differences_of_six(model, state, eps):
+    """[A B] of order 6 by plain MuJoCo: columns by movements and speeds."""
+    data, spec = mujoco.MjData(model), mujoco.mjtState.mjSTATE_INTEGRATION
+    start, columns = np.zeros(model.nq), []
+
+    def after(k, by):
+        mujoco.mj_setState(model, data, state, spec)
+        start[:] = data.qpos
+        movement = by * np.eye(2 * model.nv)[k]
+        mujoco.mj_integratePos(model, data.qpos, movement[: model.nv], 1.0)
+        data.qvel += movement[model.nv :]
+        mujoco.mj_step(model, data)
+        moved = np.zeros(model.nv)
+        mujoco.mj_differentiatePos(model, moved, 1.0, start, data.qpos)
+        return np.concatenate([moved, data.qvel])
+
+    for k in range(2 * model.nv):
+        one, two, three = (after(k, n * eps) - after(k, -n * eps) for n in (1, 2, 3))
+        columns.append((45.0 * one - 9.0 * two + three) / (60.0 * eps))
+    return np.array(columns).T
+
+
+def test_a_table_on_its_feet():
+    """The advised eps is as right as is said, beside differences of order 6; contacts that open or close are named."""
+    result = answered(TABLE)
+    rows = {row.eps: row for row in result.tables["contact_derivatives"]}
+    values = result.top[1].values
+    best, place = values["best"], Standing(read(TABLE))
+    assert values["about"]["contacts"] == 4 and values["about"]["limits"] == [] and failed(result) == []
+    right = differences_of_six(place.stepper.model, place.state, 1e-6)
+    for eps, row in rows.items():
+        error = ways.worst_block(place.values(eps)[:, :12] - right, right, 6)[0]
+        assert error < 1e-8 or 0.3 < row.error / error < 3.0
+    assert rows[best.eps].error == best.error < 1e-5
+    assert "floor and knob" in rows[1e-2].changed and rows[1e-7].changed == ""
+    assert values["opened"].eps == min(eps for eps, row in rows.items() if row.changed)
+    assert f"from {values['opened'].eps:.0e} on".replace("e-0", "e-") in say(result.top[1])
+
+
+def test_what_touches_nothing_has_no_row_and_a_limit_that_acts_is_said():
+    in_air = answered(TABLE.replace('type="plane"', 'type="plane" contype="0" conaffinity="0"'))
+    assert "contact_derivatives" not in in_air.tables and "Standing" not in say(in_air.top[1])
+    rests = """<mujoco><worldbody><body><joint name="lid" axis="0 1 0" range="-10 10" damping="0.1"/>
+    <geom size="0.05" pos="0.3 0 0"/></body></worldbody></mujoco>"""
+    told = answered(rests).top[1]
+    assert told.values["about"] == {"posture": "qpos0", "contacts": 0, "limits": ["limit of lid"]}
+    assert "Standing on its limit of lid" in say(told)
+
+
+CARTS = """<mujoco><option gravity="0 0 0"/><worldbody><body>
+<joint name="driven" type="slide" axis="1 0 0"/><geom size="0.1" mass="1"/></body>
+<body pos="0 1 0"><joint name="other" type="slide" axis="1 0 0" {}/><geom size="0.1" mass="1"/></body></worldbody>
+<actuator><motor joint="driven"/>{}</actuator></mujoco>"""
+BALANCER = """<mujoco><option timestep="0.002"/><worldbody><geom type="plane" size="5 5 .1"/>
+<body name="frame" pos="0 0 0.07"><freejoint name="base"/>
+<geom type="box" pos="0 0 0.12" size=".04 .05 .07" mass="0.9" contype="0" conaffinity="0"/>{}</body></worldbody>
+<actuator><motor joint="left"/><motor joint="right"/></actuator></mujoco>"""
+WHEEL = """<body pos="0 {} 0"><joint name="{}" axis="0 1 0" damping="0.002"/>
+<geom type="cylinder" zaxis="0 1 0" size=".07 .015" mass=".15"/></body>"""
+INVERTED = CARTS.replace('<option gravity="0 0 0"/>', "").replace(
+    'type="slide" axis="1 0 0" {}/><geom size="0.1" mass="1"/>',
+    'axis="0 1 0" {}/><geom size="0.1" mass="1" pos="0 0 0.5"/>'
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("xml, names", [
+    (CARTS.format("", ""), ["other"]), (CARTS.format('damping="5"', ""), ["other"]),  # its place stays
+    (CARTS.format('damping="5" stiffness="9"', ""), []), (CARTS.format("", '<motor joint="other"/>'), []),
+    (CARTS.format("", '<general joint="other" dyntype="filter" dynprm="0.1"/>'), []), (INVERTED.format("", ""), ["other"]),
+    (BALANCER.format(WHEEL.format(0.09, "left") + WHEEL.format(-0.09, "right")), ["base x", "base y", "base turn z"]),
+])  # fmt: skip
+def test_directions_that_no_control_moves_are_named(xml, names):
+    """A cart on its own; of a robot on two wheels three: it slips neither along nor about the vertical, nor sideways."""
+    told = answered(xml).top[1]
+    assert sorted(told.values["names"]) == sorted(names)
+    assert ("a linear-quadratic regulator has no solution" in say(told)) == bool(names)
+
+
+def test_a_singular_value_within_the_error_counts_as_zero():
+    """The second of two integrators is moved by a little: that divided by the root of 2 is the singular value."""
+    A, units = np.array([[1.0, 1.0], [0.0, 1.0]]), np.ones(2)
+    for moved, error, count in ((0.0, 1e-9, 1), (1.35e-6, 1e-6, 1), (1.5e-6, 1e-6, 0)):
+        values = np.hstack([A, [[1.0], [moved]]])
+        truth = values + np.diag([0.0, error])[:, [0, 1, 0]] * [1.0, 1.0, 0.0]
+        assert len(not_moved(values, truth, units)) == count
+    model = mujoco.MjModel.from_xml_string(CARTS.format("", ""))
+    assert directions(model, np.array([[0.6, 1.0, 0.0, 0.0], [0.0, 0.0, 0.1, 1.0]])) == [
+        "driven with other",
+        "other",
+    ]
+    assert standing.FEWEST == 3

@@ -20,35 +20,6 @@ Call = Callable[[], np.ndarray]
 Run = Callable[[int], np.ndarray]  # how many times
 
 
-def of_transition(
-    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool,
-    eps: float,
-) -> Call:  # fmt: skip
-    """A call of mjd_transitionFD: A (2 nv, 2 nv) of a step from a state (movement, v) under constant torque.
-
-    q: (nq,) rad, m; v, tau: (nv,). It does not take RK4, and its B is by controls.
-    """
-    stepper = dynamics.stepper(dt, integrator)
-    state, nv = dynamics.states(stepper, q, v, tau)[1][0], stepper.model.nv
-    places = np.concatenate([dynamics.dofs, nv + dynamics.dofs])
-    return lambda: stepper.derivative(state, eps, centred)[0][np.ix_(places, places)]
-
-
-def of_inverse(dynamics: MujocoDynamics, q: Array, v: Array, a: Array, eps: float) -> Call:
-    """A call of mjd_inverseFD, one-sided: dtau/dq and dtau/dv side by side, (nv, 2 nv); a: (nv,)."""
-    stepper = dynamics.stepper(1.0, "Euler")
-    model, data = stepper.model, stepper.put(dynamics.states(stepper, q, v)[1][0])
-    data.qacc[dynamics.dofs] = a
-    by = np.zeros((2, model.nv, model.nv))
-    places = np.ix_(dynamics.dofs, dynamics.dofs)
-
-    def call() -> np.ndarray:
-        mujoco.mjd_inverseFD(model, data, eps, True, *by, None, None, None, None, None)
-        return np.hstack([matrix.T[places] for matrix in by])  # MuJoCo's are transposed
-
-    return call
-
-
 def of_steps(
     dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool,
     eps: float,

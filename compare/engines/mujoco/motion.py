@@ -185,8 +185,8 @@ def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
     return one, other
 
 
-class Motion(NamedTuple):
-    """A motion: a state of a Stepper of the whole model; controls at each step, (steps, nu), or None."""
+class Roll(NamedTuple):
+    """What Stepper.roll takes: a state of the whole model; controls at each step, (steps, nu), None: its own."""
 
     name: str
     state: Array
@@ -201,23 +201,23 @@ class Scene:
     tree: tmt.Tree
     whole: "Smaller"
     stepper: Stepper
-    motions: Sequence[Motion]
+    rolls: Sequence[Roll]
     points: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
-        return "; ".join(motion.name for motion in self.motions)
+        return "; ".join(roll.name for roll in self.rolls)
 
     @property
     def duration(self) -> float:
-        return self.stepper.dt * sum(motion.steps for motion in self.motions)
+        return self.stepper.dt * sum(roll.steps for roll in self.rolls)
 
     def repeated(self, small: "Smaller", from_keys: bool = False) -> list[Repeated]:
         """Its motions by a smaller model. from_keys: from the keyframes of their names."""
         stepper = Stepper(small.model, self.stepper.dt, self.stepper.integrator)
         return [
-            Repeated(stepper, self.stepper, *motion[1:], key=motion.name if from_keys else "")
-            for motion in self.motions
+            Repeated(stepper, self.stepper, *roll[1:], key=roll.name if from_keys else "")
+            for roll in self.rolls
         ]
 
     def run(self, small: "Smaller", from_keys: bool = False) -> list[Path]:
@@ -250,5 +250,5 @@ class Scene:
 
     def starts(self, small: "Smaller") -> Iterator[tuple[str, mujoco.MjData]]:
         """The names of the motions, and in turn the data of a model at their starts."""
-        for motion, repeated in zip(self.motions, self.repeated(small)):
-            yield motion.name, repeated.stepper.put(repeated.state)
+        for roll, repeated in zip(self.rolls, self.repeated(small)):
+            yield roll.name, repeated.stepper.put(repeated.state)

@@ -1,38 +1,34 @@
-"""Derivatives: how exact is each way to them, and at what cost?"""
+"""Derivatives: which eps for A and B of the file's own step?"""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from functools import partial
-from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
 
+import tmt
 from tmt.compiled.evaluator import Evaluator
 
-from ...core import timing
+from ...core.check import Result
 from ...core.finding import Finding
-from ...engines import LABELS
+from ...core.timing import fastest
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.engine import methods_for
-from ...engines.mujoco.names import INTEGRATORS as MEMBERS
+from ...engines.mujoco.names import INTEGRATORS
 from ...engines.mujoco.reading import Reading
-from ...engines.mujoco.stepper import Stepper, touching
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from ...stability.motion import postures_of
 from .. import Drawing, Experiment
 from ..setup import Setup
-from . import ways
-from .subjects import Subject, all_subjects, dynamics_of
-from .ways import EXACT, FORWARD, ContactRow, CostRow, DerivativeRow, DerivativesResult, Measured, Task
+from . import standing, ways
+from .ways import CENTRED, ONE_SIDED, DerivativeRow, Subject, WayRow, number
 
-EXPERIMENT = Experiment(order=105, serves_own=False, timed=True, quick_speeds=8)
+EXPERIMENT = Experiment(
+    order=105, serves_own=False, timed=True, quick_speeds=8, first_screen=("answer", "standing")
+)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
-FEW_SPEEDS = 8  # of a robot with all integrators: of others they take minutes
-INTEGRATORS = "Euler", "implicitfast", "implicit", "discrete", "RK4"
-USUAL_INTEGRATOR = "implicitfast"  # of robots whose file's own is none of these
-SETTLED = 3.0  # s, of the run to where a robot stands
-Work = Iterable[list[Measured]]
+FEW_SPEEDS = 8  # of a robot for which tmt's derivatives are compiled in a second
+EXACT = "tmt, exact"
 
 
 def claim_values(robot: Robot) -> dict[str, Any]:
@@ -44,172 +40,79 @@ def skipped(robot: Robot) -> Finding | None:
     return Finding("derivatives", "large", values) if robot.coordinates.nv > MOST_SPEEDS else None
 
 
-def begin(setup: Setup) -> Work:
-    """Measure the errors at all subjects, in parallel with other work."""
-    mujoco, is_small = cast(Mujoco, setup.engines["mujoco"]), setup.robot.coordinates.nv <= FEW_SPEEDS
-    dt, states = float(mujoco.model.opt.timestep), setup.of(4, 2, 2) if is_small else 1
-    tasks: list[Task] = []
-    for subject in all_subjects(setup.robot, setup.random.first(200), dt, states):
-        has_all = is_small and (setup.alone or not tasks)
-        # of all subjects but the first the file's integrator only, unless the experiment runs alone
-        names = INTEGRATORS if has_all else (integrator_of(setup, subject),)
-        tasks.append(Task(subject, names, compiles=not tasks))
-    return setup.map(partial(ways.measured, mujoco=mujoco, dt=dt), tasks)
-
-
-def integrator_of(setup: Setup, subject: Subject) -> str:
-    """The model's integrator, for whose steps an eps is advised; implicitfast where it is not compared."""
-    model = cast(Mujoco, setup.engines["mujoco"]).model
-    compared = [name for name in INTEGRATORS if name in methods_for(subject.tree)]
-    same = (name for name in compared if MEMBERS[name] == model.opt.integrator)
-    return next(same, USUAL_INTEGRATOR)
-
-
-def rows(setup: Setup, work: Work | None = None) -> DerivativesResult:
-    result = DerivativesResult("derivatives", shown=[])
-    groups = list(begin(setup) if work is None else work)
-    every, main = [measured for group in groups for measured in group], groups[0]
-    for measured in every:
-        result.rows += measured.rows
-        for way, share in measured.shares.items():
-            name = f"{measured.quantity.name}: {way} to exact, over its tolerance"
-            result.check(measured.subject.name, name, share, 1.0, "", rounding=way in EXACT)
-    result.main = main[0].subject.name
+def rows(setup: Setup) -> Result:
+    """The errors of all ways at the states of a scene, the eps that serves best, and standing on contacts."""
+    result, engine = Result("derivatives", shown=[]), cast(Mujoco, setup.engines["mujoco"])
+    case, dt = ways.case_of(setup.robot), float(engine.model.opt.timestep)
+    names = [name for name in INTEGRATORS if name in methods_for(case.tree)]
+    integrator = next((name for name in names if INTEGRATORS[name] == engine.model.opt.integrator), "")
+    if not integrator:
+        result.not_judged("", "A and B of the file's step", "tmt has no step of its integrator")
+        return result
+    subject = Subject(engine, case, dt, integrator, setup.of(10, 4, 2))
+    function = ways.TRANSITION if subject.stepper.takes_transition else ways.BY_STEPS
+    error, share = subject.errors_of_tmt()
+    result.check(case.name, f"{EXACT}, to 31 digits, over its tolerance", share, 1.0, "", rounding=True)
+    exact, table = subject.exact, list[WayRow]()
+    for side in (CENTRED, ONE_SIDED):
+        way, errors = f"{function}, {side}", dict[float, float | None]()
+        values = {eps: subject.by_differences(eps, side == CENTRED) for eps in ways.SIZES}
+        for eps, value in values.items():
+            size, block = ways.worst_block(value - exact, exact, subject.qd.shape[1], subject.tolerance)
+            errors[eps] = number(size)
+            result.rows.append(DerivativeRow(way, eps, errors[eps], block, len(exact)))
+        table.append(ways.best_of(way, errors))
+        if side == CENTRED:
+            share = subject.share_of_differences(values)
+            result.check(case.name, f"{way}, to exact, over its tolerance", share, 1.0, "")
+    result.rows.append(DerivativeRow(EXACT, None, number(error), "", 1))
+    table.append(WayRow(EXACT, error=number(error)))
     setup.quiet()  # nothing else may run while times are taken
-    add_times(setup, result, main)
-    scenes = [row for measured in every if measured.subject.kind == "scene" for row in measured.rows]
-    add_costs(result, scenes, main)
-    hard = [measured for measured in every if measured.subject.kind != "scene"]
-    in_air = any(feature.feature == "contact" for feature in setup.robot.features)
-    integrator = integrator_of(setup, main[0].subject)
-    add_advice(result, scenes, hard, integrator, in_air)
-    if setup.alone and in_air:
-        setup.progress("derivatives: contacts")
-        if setup.reading and (rows := contact_rows(setup.reading)):
-            result.tables["contact_derivatives"] = rows
-            result.top.append(result.finding("contacts", rows=rows))
+    add_times(setup, subject, table)
+    result.tables["derivative_costs"], result.headline = table, result.finding("headline", row=table[0])
+    about = {"integrator": integrator, "dt": dt, "scene": case.name, "states": len(exact)}
+    result.top.append(result.finding("answer", about=about, rows=table, by=subject.by))
+    if setup.reading and (setup.alone or setup.size == "full"):
+        add_standing(result, setup.reading)
     return result
 
 
-def add_times(setup: Setup, result: DerivativesResult, main: Sequence[Measured]) -> None:
-    """The seconds of one evaluation at the first state of the main subject."""
-    mujoco, subject = cast(Mujoco, setup.engines["mujoco"]), main[0].subject
-    dt, dynamics = float(mujoco.model.opt.timestep), dynamics_of(mujoco, subject)
-    calls: dict[tuple[str, str], Callable[[], Any]] = {}
-    first = subject._replace(q=subject.q[:1], qd=subject.qd[:1], tau=subject.tau[:1])
-    for measured in main:
-        quantity = measured.quantity
-        for way in quantity.differences(dynamics, subject, dt, 0):
-            calls[quantity.name, way.name] = way.call(ways.USUAL)
-        calls[quantity.name, ways.NUMPY] = partial(quantity.by_numpy, first, dt)
-        if ways.COMPILED in measured.shares:
-            state = [values[0] for values in quantity.arguments(subject, dt)]
-            evaluator = Evaluator(subject.tree, quantity.function)
-            calls[quantity.name, ways.COMPILED] = partial(evaluator.of_one, *state)
-    result.times = timing.fastest(calls, setup.of(50, 20, 2))
+def add_times(setup: Setup, subject: Subject, table: list[WayRow]) -> None:
+    """The time of a call of each way at the first state."""
+    start, state, tree = subject.starts[0], (subject.q[0], subject.qd[0], subject.tau[0]), subject.case.tree
+    calls: dict[str, Any] = {}
+    for row in table[:2]:
+        how = row.eps or 0.0, row.way.endswith(CENTRED), subject.by
+        calls[row.way] = partial(subject.stepper.derivative, start, *how)
+    calls[EXACT] = partial(tmt.step_derivatives, *state, subject.dt, subject.scheme, tree)
+    if len(subject.qd[0]) <= FEW_SPEEDS:
+        table[-1].way = f"{EXACT}, compiled"
+        evaluator = Evaluator(tree, f"step_derivatives:{subject.scheme}")
+        calls[table[-1].way] = partial(evaluator.of_one, *state, np.array([subject.dt]))
+        calls[table[-1].way]()  # compiles
+    seconds = fastest(calls, setup.of(20, 10, 2))
+    for row in table:
+        row.time = 1e6 * seconds[row.way]
 
 
-def contact_rows(reading: Reading) -> list[ContactRow]:
-    """Differences of the step where a run of 3 s from the file's first posture ends.
-
-    The reference is the eps that agrees best with the next one.
-    """
-    posture, model = postures_of(reading)[0], reading.model
-    stepper = Stepper(model, reading.dt, reading.integrator)
-    rest = stepper.roll(stepper.start(posture.key), round(SETTLED / reading.dt)).states[0]
-    states = 2 * model.nv
-    base = touching(stepper, rest, np.zeros(states + model.na))
-    if not base:
-        return []
-    units = ways.units_of(reading.tree, ways.STATE)
-    matrices = [stepper.derivative(rest, eps)[0][:states, :states] for eps in ways.SIZES]
-    steps = [np.abs(A - finer).max() for A, finer in pairwise(matrices)]
-    truth = matrices[int(np.argmin(steps))]
-    rows = []
-    for eps, A in zip(ways.SIZES, matrices):
-        changed: set[str] = set()
-        for nudge in eps * np.eye(states + model.na):
-            for by in (nudge, -nudge):
-                changed |= base ^ touching(stepper, rest, by)
-        error, *_ = ways.relative(A - truth, truth, (units, units))
-        rows.append(ContactRow(
-            posture=posture.name, integrator=reading.integrator, contacts=len(base), eps=eps,
-            difference=error if np.isfinite(error) else None, changed="; ".join(sorted(changed)),
-        ))  # fmt: skip
-    return rows
+def add_standing(result: Result, reading: Reading) -> None:
+    """Differences where the file stands, and the directions that no control moves there."""
+    place, m, best, names = standing.Standing(reading), reading.model, None, list[str]()
+    rows, truth = place.rows()
+    if truth is not None:
+        best = ways.best_of("standing", {row.eps: row.error for row in rows})
+        if m.nu:
+            units = np.repeat([1.0, reading.dt, 1.0], [m.nv, m.nv, m.na])
+            names = standing.directions(m, standing.not_moved(place.values(best.eps or 0.0), truth, units))
+    if place.acting:
+        result.tables["contact_derivatives"] = rows
+    limits = sorted(name for name in place.acting if name.startswith("limit of "))
+    about = {"posture": place.name, "contacts": len(place.acting) - len(limits), "limits": limits}
+    opened = next((row for row in reversed(rows) if row.changed), None)
+    result.top.append(result.finding("standing", about=about, best=best, opened=opened, names=names))
 
 
-def add_costs(result: DerivativesResult, scenes: Sequence[DerivativeRow], main: Sequence[Measured]) -> None:
-    """The error of each way at all scenes, with its best eps, and its time."""
-    costs: list[CostRow] = []
-    for quantity, way in dict.fromkeys((row.quantity, row.way) for measured in main for row in measured.rows):
-        same = [row for row in scenes if (row.quantity, row.way) == (quantity, way)]
-        best, seconds = ways.best_of(same), result.times.get((quantity, way))
-        time = None if seconds is None else 1e6 * seconds
-        costs.append(CostRow(quantity=quantity, way=way, best_eps=best.eps, error=best.error, time=time))
-    result.tables["derivative_costs"] = costs
-    timed = [row for row in costs if row.time]
-    pairs = [(row, of_mujoco(timed, row.quantity)) for row in timed if row.way == ways.COMPILED]
-    result.find(
-        "costs",
-        engines=[row for row in timed if row.way in LABELS.values()],
-        exact=[row for row in timed if row.quantity == FORWARD and row.way in EXACT],
-        pairs=[(row, other) for row, other in pairs if other],
-    )
-
-
-def of_mujoco(costs: Sequence[CostRow], quantity: str) -> CostRow | None:
-    """MuJoCo's way to a quantity: its own function, centred where it can be."""
-    others = [row for row in costs if row.quantity == quantity and row.way not in EXACT]
-    others.sort(key=lambda row: (row.way.endswith(ways.CENTRED), row.way.startswith("mjd")))
-    return others[-1] if others else None
-
-
-def add_advice(
-    result: DerivativesResult, scenes: Sequence[DerivativeRow], hard: Sequence[Measured], integrator: str,
-    in_air: bool,
-) -> None:  # fmt: skip
-    """Which eps to use, by MuJoCo's function where it takes the integrator; where that fails."""
-    by_eps = [row for row in scenes if row.eps]
-    step = [row for row in by_eps if row.quantity == ways.step_name(integrator)]
-    inverse = [row for row in by_eps if row.quantity == ways.INVERSE]
-    centred = [row for row in step if row.way.endswith(ways.CENTRED)]
-    by_function = [row for row in centred if row.way.startswith(ways.TRANSITION)]
-    way = ways.TRANSITION if by_function else ways.BY_STEPS
-    one_sided = [row for row in step if row.way == f"{way}, {ways.ONE_SIDED}"]
-    result.drawn, result.integrator = step + inverse, integrator
-    values: dict[str, Any] = {
-        "way": way,
-        "integrator": integrator,
-        "centred": ways.best_of(by_function or centred),
-        "by_steps": ways.best_of(row for row in centred if row not in by_function) if by_function else None,
-        "one_sided": ways.best_of(one_sided),
-        "usual": ways.worst_of_each_eps(one_sided)[ways.USUAL],
-        "inverse": ways.best_of(inverse),
-        "exact": ways.best_of(row for row in scenes if row.way in EXACT),
-        "in_air": in_air,
-    }
-    result.headline = result.finding("headline", way=way, integrator=integrator, centred=values["centred"])
-    result.top.append(result.finding("advice", **values))
-    pairs = []
-    for measured in hard:
-        if measured.quantity.name != FORWARD:
-            name = measured.quantity.name
-            at_scenes = ways.best_of(tried(by_eps, name))
-            rows_here = ways.worst_of_each_eps(tried([row for row in measured.rows if row.eps], name))
-            pairs.append({"row": rows_here[at_scenes.eps or 0.0], "scenes": at_scenes})
-    result.find("hard", pairs=pairs)
-
-
-def tried(rows: Sequence[DerivativeRow], quantity: str) -> list[DerivativeRow]:
-    """The rows of a quantity by MuJoCo's function, centred; by differences of mj_step where there is none."""
-    same = [row for row in rows if row.quantity == quantity and not row.way.endswith(ways.ONE_SIDED)]
-    by_function = [row for row in same if not row.way.startswith(ways.BY_STEPS)]
-    return by_function or same
-
-
-def figures(result: DerivativesResult, robot: Robot) -> Iterator[Drawing]:
-    from .figures_derivatives import draw_errors, draw_times  # matplotlib is for the process that draws
+def figures(result: Result, robot: Robot) -> Iterator[Drawing]:
+    from .figures_derivatives import draw_errors  # matplotlib is for the process that draws
 
     yield partial(draw_errors, result)
-    yield partial(draw_times, result)

@@ -25,6 +25,8 @@ from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
+from ...stability.answer import joint_of
+from ...stability.push import Pushed
 from .. import Experiment
 from ..setup import Setup
 from .records import JointRow, ModelRow, UseRow
@@ -42,6 +44,7 @@ EXPERIMENT = Experiment(
 ERROR = 1e-3  # rad or m, if none is asked for
 STATES = 5  # random ones, at which the locked models are compared
 ROUNDS = 6  # of timing
+QUANTITY, UNSTABLE = "a motion with fewer joints", "the file is not stable at its own step"
 
 
 def claim_values(robot: Robot) -> dict[str, float]:
@@ -84,21 +87,25 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     """Rows, checks and the answer of a motion of a file; the smaller file is written."""
     allowed, write = setup.request.error or ERROR, setup.request.write
     try:
-        scene = scene_of(setup, reading)
+        scene, motions = scene_of(setup, reading)
     except ValueError as reason:
-        result.not_judged("", "a motion with fewer joints", str(reason), about=About.PROGRAM)
+        result.not_judged("", QUANTITY, str(reason), about=About.PROGRAM)
         return
-    if not scene.is_finite:
-        result.top.append(
-            result.finding("unstable", scene=scene.name, dt=reading.dt, integrator=reading.integrator)
-        )
-        result.not_judged(
-            scene.name, "a motion with fewer joints", "the file's own run fails", about=About.STEP
-        )
-        return
+    for motion in motions:
+        pushed = Pushed(motion, reading.dt, reading.integrator)
+        pushed.find_truth()
+        is_judged = pushed.judged_by not in ("", "falls")
+        verdict = pushed.verdict(pushed.push, reading.dt, reading.integrator) if is_judged else None
+        if (verdict and verdict.why) or not scene.is_finite:
+            limit = pushed.limit(pushed.push, reading.integrator).stable_up_to if verdict else None
+            joint = joint_of(pushed.model, verdict.dof) if verdict and verdict.dof >= 0 else ""
+            about = {"scene": motion.name, "dt": reading.dt, "integrator": reading.integrator, "joint": joint}
+            result.top.append(result.finding("unstable", about=about, verdict=verdict, limit=limit))
+            result.not_judged(motion.name, QUANTITY, UNSTABLE, about=About.STEP)
+            return
     free, small = take_out(scene)
     locks = lockable(scene, small, allowed)
-    about = {
+    made = {
         "source": str(reading.source),
         "scene": scene.name,
         "duration": scene.duration,
@@ -107,7 +114,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     with draft_of(Path(write) if write else None) as draft:
         while True:  # until an error that six digits make is allowed, too
             names, model, _ = locks.models[-1]
-            comment = block(TEXT, "comment", about=about, names=names, command=setup.command)
+            comment = block(TEXT, "comment", about=made, names=names, command=setup.command)
             error = scene.error(written(scene, model, draft, comment), from_keys=True)
             if error <= allowed or not names:
                 break
@@ -132,7 +139,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
         UseRow(part, count, len(of), ", ".join(sorted(of))) for part, (count, of) in used
     ]
     result.top.append(result.finding(
-        "answer", about=about, unit=movement_unit(coordinates_of(scene)), names=names, moved=scene.use.moved,
+        "answer", about=made, unit=movement_unit(coordinates_of(scene)), names=names, moved=scene.use.moved,
         models=models, free=[row for row in free if row.same_bits], actuators=sorted(actuators), error=error,
         written=write if is_written else "", refused=write and not is_written,
         assets=assets_of(draft).name if files_of(model.spec) else "",

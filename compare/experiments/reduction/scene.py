@@ -2,21 +2,20 @@
 
 import numpy as np
 
-from ...engines.mujoco.motion import Motion, Scene, actuators
+from ...engines.mujoco.motion import Roll, Scene
 from ...engines.mujoco.names import INTEGRATORS, element_name, joint_places, set_control
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller, locked
 from ...engines.mujoco.source import Source
 from ...engines.mujoco.stepper import Stepper
 from ...robots.case import Case
-from ...stability.motion import posture_of, postures_of
+from ...stability.motion import Motion, motion_of, posture_of, postures_of
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe
-EARLY = 1e-9  # s: a control acts from the step that begins so shortly before it
 
 
-def scene_of(setup: Setup, reading: Reading) -> Scene:
+def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:
     """All of --scenes; else --controls, or what the file states, from a posture. ValueError: that cannot be."""
     request = setup.request
     points = tuple(request.points.split(",")) if request.points else ()
@@ -26,20 +25,16 @@ def scene_of(setup: Setup, reading: Reading) -> Scene:
     for case in cases:
         if case.scene.locked or np.any(case.scene.damping) or not case.scene.gravity:
             raise ValueError(f"the scene {case.name} changes the model: locked, damping or gravity")
-    motions = [motion_of_case(case, stepper) for case in cases]
-    if not motions:
+    rolls = [roll_of(case, stepper) for case in cases]
+    motions = [Motion(reading.model, roll.name, roll.state, "") for roll in rolls]
+    if not rolls:
         posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
-        state = stepper.start(posture.key, np.array(posture.q) if posture.q else None)
-        times = np.array((request.controls or {}).get("time", [DURATION]))
-        steps, controls = max(1, round(times[-1] / reading.dt)), None
-        if request.controls:
-            controls = np.tile(state[stepper.places["ctrl"]], (steps, 1))
-            at = np.searchsorted(times, reading.dt * np.arange(steps) + EARLY, side="right") - 1
-            for name, (places, _) in actuators(whole.model).items():
-                if name in request.controls:
-                    controls[:, places] = request.controls[name][at, None]
-        motions = [Motion(posture.name, state, steps, controls)]
-    return Scene(reading.tree, whole, stepper, motions, points)
+        motion, controls = motion_of(reading, posture, request.controls), None
+        steps = max(1, round((motion.times[-1] if len(motion.times) else DURATION) / reading.dt))
+        if len(motion.times):
+            controls = np.vstack([np.array(part) for _, part in motion.parts(stepper, steps, 0.0, 0.0)])
+        rolls, motions = [Roll(motion.name, motion.state, steps, controls)], [motion]
+    return Scene(reading.tree, whole, stepper, rolls, points), motions
 
 
 def scene_of_case(case: Case, source: Source) -> Scene:
@@ -59,10 +54,10 @@ def scene_of_case(case: Case, source: Source) -> Scene:
     whole = locked(Smaller(whole.spec), {name: q[joints[name].q] for name in scene.locked})
     integrator = next(name for name, member in INTEGRATORS.items() if member == whole.model.opt.integrator)
     stepper = Stepper(whole.model, float(whole.model.opt.timestep), integrator)
-    return Scene(case.tree, whole, stepper, [motion_of_case(case, stepper)])
+    return Scene(case.tree, whole, stepper, [roll_of(case, stepper)])
 
 
-def motion_of_case(case: Case, stepper: Stepper) -> Motion:
+def roll_of(case: Case, stepper: Stepper) -> Roll:
     """The motion of a scene: its posture, speeds, and torques or controls."""
     scene, m = case.scene, stepper.model
     q, v, forces = m.qpos0.copy(), np.zeros(m.nv), np.zeros(m.nv)
@@ -77,4 +72,4 @@ def motion_of_case(case: Case, stepper: Stepper) -> Motion:
         if u is not None:
             set_control(m, number, u, data.ctrl, data.act)
     lasts = min(scene.judged or scene.duration, scene.duration)
-    return Motion(scene.name, stepper.state(), max(1, round(lasts / stepper.dt)))
+    return Roll(scene.name, stepper.state(), max(1, round(lasts / stepper.dt)))

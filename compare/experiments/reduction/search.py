@@ -95,8 +95,8 @@ def starts(scene: Scene) -> dict[str, tuple[float, ...]]:
     """
     stepper, places = scene.stepper, joints(scene.whole.model)
     largest = np.zeros((len(places), 3))
-    for motion, path in zip(scene.motions, scene.paths):
-        data = stepper.put(motion.state)
+    for roll, path in zip(scene.rolls, scene.paths):
+        data = stepper.put(roll.state)
         mujoco.mj_forward(stepper.model, data)
         first = data.qacc.copy()
         for row, (of_q, of_v) in zip(largest, places.values()):
@@ -104,8 +104,8 @@ def starts(scene: Scene) -> dict[str, tuple[float, ...]]:
             for k in np.linspace(0, len(path.q) - 1, SAMPLES).astype(int):
                 data.qpos[:], data.qvel[:] = path.q[k], path.v[k]
                 data.qpos[of_q], data.qvel[of_v] = path.q[0, of_q], 0.0
-                if motion.controls is not None:
-                    data.ctrl[:] = motion.controls[min(k, motion.steps - 1)]
+                if roll.controls is not None:
+                    data.ctrl[:] = roll.controls[min(k, roll.steps - 1)]
                 mujoco.mj_forward(stepper.model, data)
                 row[2] = max(row[2], np.abs(data.qacc[of_v]).max())
     return {name: tuple(row) for name, row in zip(places, largest.tolist())}

@@ -73,7 +73,6 @@ EDITS = (
     # of a file's motion
     ("reduction.search", "take_out", "trial if is_same else small", "trial", "what changes the motion is taken out"),
     ("reduction.search", "same_bits", "bits[0] == bits[1]", "True", "every motion is the same"),
-    ("reduction.scene", "scene_of", "_1 + EARLY", "_1 - EARLY", "a control acts a step too late"),
     ("mujoco.motion", "Repeated.__init__", "here.qfrc_applied[v] = _1", "pass", "forces that act all the time are lost"),
     ("mujoco.motion", "apart", "np.isfinite(error)", "True", "a run that fails has no error"),
 )  # fmt: skip

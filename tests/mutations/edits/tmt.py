@@ -41,8 +41,4 @@ EDITS = (
     ("quantities", "State.torque_rates", "added(by_movement, pulled)", "by_movement", "derivatives without springs"),
     ("method", "placed_frame", "carried(carrier, _1)", "carried(carrier, ZERO)", "a site is at the origin of its joint"),
     ("lock", "locked", "carrier.turned(turn)", "turn", "a site of a locked joint keeps its axes"),
-    ("ways", "share_of_differences", "max(shares)", "min(shares)", "differences are judged at their worst eps alone"),
-    ("ways", "relative", "np.abs(difference)", "size", "an error is not relative"),
-    ("ways", "sizes", "of_rows * largest / of_columns", "size", "an error of a step is relative to a block that is nearly zero"),
-    ("ways", "share_of_differences", "np.abs(exact.high[:, :, :sizes.shape[1]])", "0.0", "rounding does not grow in a step"),
 )  # fmt: skip
