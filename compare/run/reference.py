@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.text import say
+from ..core.text import block, say
 from ..core.words import in_one_line
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, Source, engine, has_hinges, parse, read
@@ -18,6 +18,8 @@ from ..engines.mujoco.parameters import of_source, of_welded, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import aside, own_object, raised_in
 from ..experiments.setup import Request
+from ..process.writing import assets_of, why_not
+from ..report.folder import OWN
 from ..robots import Robot
 from ..robots.arm import ARM
 from ..robots.case import SEED
@@ -106,13 +108,14 @@ class Compared(NamedTuple):
             if options.scenes:
                 raise ModelError("--controls and --scenes both say what the robot does")
         if asked["write"] is not None:
-            from ..experiments.reduction.written import refusal  # imports are slow
+            from ..engines.mujoco.smaller import MARK  # imports are slow
 
             other = [Source(Path(options.reference))] if is_solution(options.reference or "") else []
-            path = Path(asked["write"]).absolute()
             needed = [file for source in (self.reading.source, *other) for file in source.files]
-            if why := refusal(path, needed, Path(options.out)):
-                raise ModelError(f"cannot write {asked['write']}: {why}")
+            path, reserved = Path(asked["write"]).absolute(), [Path(options.out, name) for name in OWN]
+            if why := why_not(path, needed, reserved, MARK):
+                about = {"path": asked["write"], "why": why, "assets": assets_of(path).name}
+                raise ModelError(block("run", "not_writable", **about))
             asked["write"] = str(path)
         step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
         return Request(step, **asked)

@@ -258,8 +258,8 @@ def test_a_singular_value_within_the_error_counts_as_zero():
         values = np.hstack([A, [[1.0], [moved]]])
         truth = values + np.diag([0.0, error])[:, [0, 1, 0]] * [1.0, 1.0, 0.0]
         assert len(not_moved(values, truth, units)) == count
-    model = mujoco.MjModel.from_xml_string(CARTS.format("", ""))
-    assert directions(model, np.array([[0.6, 1.0, 0.0, 0.0], [0.0, 0.0, 0.1, 1.0]])) == [
+    stepper = Standing(read(CARTS.format("", ""))).stepper
+    assert directions(stepper, np.array([[0.6, 1.0, 0.0, 0.0], [0.0, 0.0, 0.1, 1.0]])) == [
         "driven with other",
         "other",
     ]

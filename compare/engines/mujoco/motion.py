@@ -24,6 +24,8 @@ ACTS = {  # what has a row of constraints, by the kinds of rows
     "tendon": (mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON, mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
 }
 
+LIMITS = {int(ACTS[kind][0]): kind for kind in ("joint", "tendon")}
+
 
 def joints(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     """The places in qpos and qvel of each joint."""
@@ -183,6 +185,16 @@ def used(motions: Sequence[Repeated], paths: Sequence[Path]) -> Use:
 def pair_of(model: mujoco.MjModel, numbers: Iterable[int]) -> tuple[str, str]:
     one, other = (element_name(model, "geom", number) for number in numbers)
     return one, other
+
+
+def acting(m: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
+    """The pairs of geoms that touch, with the number of their contacts, and the limits that act."""
+    pairs = [tuple(sorted(pair)) for pair in data.contact.geom[data.contact.efc_address >= 0].tolist()]
+    found = {f"{' and '.join(pair_of(m, pair))} ({pairs.count(pair)})" for pair in pairs}
+    rows = zip(data.efc_type.tolist(), data.efc_id.tolist())
+    return found | {
+        f"limit of {element_name(m, LIMITS[kind], owner)}" for kind, owner in rows if kind in LIMITS
+    }
 
 
 class Roll(NamedTuple):

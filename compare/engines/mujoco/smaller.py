@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from tmt.export.parameters import PAYLOAD, SIZES, Parameters
 from tmt.model.tree import Tree
 
+from ...process.writing import assets_of
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Use, joints
 from .names import bit, element_name, kind_of, parts_of
@@ -91,18 +92,6 @@ class Smaller:
 def files_of(spec: mujoco.MjSpec) -> list[mujoco.MjsMesh | mujoco.MjsHField]:
     """The meshes and height fields that are read from files."""
     return [asset for asset in (*spec.meshes, *spec.hfields) if asset.file]
-
-
-def assets_of(path: File) -> File:
-    """The folder of the meshes of a written file."""
-    return path.with_name(f"{path.stem}_assets")
-
-
-def is_written(path: File) -> bool:
-    """Whether `Smaller.write` wrote a file: a comment in its first line says so."""
-    with open(path, "rb") as file:
-        first = file.readline(1000)
-    return path.suffix == ".xml" and first.startswith(b"<!--") and MARK.encode() in first
 
 
 def drawing(small: Smaller, use: Use) -> int:

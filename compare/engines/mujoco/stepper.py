@@ -249,7 +249,12 @@ class Stepper:
         return both[:, :n], both[:, n:]
 
     def after(self, state: Array, by: Array, inputs: str = "ctrl") -> Array:
-        """The state, (n,), a step after a state that is moved.
+        """The state, (n,), a step after a state that is moved, see `moved`."""
+        mujoco.mj_step(self.model, self.moved(state, by, inputs))
+        return self.state()
+
+    def moved(self, state: Array, by: Array, inputs: str = "ctrl") -> mujoco.MjData:
+        """The data at a state, (n,), that is moved; what depends on it is not computed.
 
         by: a deviation, (2 nv + na,), which may be followed by a change of inputs, (nu,) or (nv,).
         """
@@ -260,8 +265,13 @@ class Stepper:
         d.act += activation
         if len(change):
             getattr(d, inputs)[:] += change
-        mujoco.mj_step(m, d)
-        return self.state()
+        return d
+
+    def forward(self, state: Array, by: Array | None = None) -> mujoco.MjData:
+        """The data at a state, (n,), that may be moved, with all that depends on it."""
+        data = self.put(state) if by is None else self.moved(state, by)
+        mujoco.mj_forward(self.model, data)
+        return data
 
     def deviation(self, one: Array, other: Array) -> Array:
         """The deviation from one state to another: movement, speeds, activations, (2 nv + na,)."""

@@ -103,7 +103,9 @@ def add_standing(result: Result, reading: Reading) -> None:
         best = ways.best_of("standing", {row.eps: row.error for row in rows})
         if m.nu:
             units = np.repeat([1.0, reading.dt, 1.0], [m.nv, m.nv, m.na])
-            names = standing.directions(m, standing.not_moved(place.values(best.eps or 0.0), truth, units))
+            names = standing.directions(
+                place.stepper, standing.not_moved(place.values(best.eps or 0.0), truth, units)
+            )
     if place.acting:
         result.tables["contact_derivatives"] = rows
     limits = sorted(name for name in place.acting if name.startswith("limit of "))

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 
-import mujoco
 import numpy as np
 
 from ...core.rows import Row
-from ...engines.mujoco.names import element_name
+from ...engines.mujoco.motion import acting
+from ...engines.mujoco.names import element_name, kind_of
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.stepper import Stepper
 from ...judge.scale import EPS, FACTOR
@@ -20,8 +20,7 @@ AGREES = 0.01  # of the largest entry of a block: extrapolated derivatives that 
 FEWEST = 3  # neighbouring eps that have to agree
 GROWS = 1e-3  # an eigenvalue that is nearer to 1 is 1, as a double one is known to the root of an error
 SMALL = 1e-3  # of the speeds in a direction: movements that count
-FREE_PARTS = "x", "y", "z", "turn x", "turn y", "turn z"
-LIMITS = {int(getattr(mujoco.mjtConstraint, f"mjCNSTR_LIMIT_{x.upper()}")): x for x in ("joint", "tendon")}
+AXES = {"free": ("x", "y", "z", "turn x", "turn y", "turn z"), "ball": ("turn x", "turn y", "turn z")}
 
 
 @dataclass
@@ -45,8 +44,8 @@ class Standing:
         self.state = state
         for data in self.stepper.watch(state, min(MOST_STEPS, round(DURATION / reading.dt))):
             size = float(np.abs(data.qacc).max(initial=0.0))
-            if size < least and (acting := acting_in(self.stepper.model, data)):
-                least, self.state, self.acting = size, state, acting
+            if size < least and (found := acting(self.stepper.model, data)):
+                least, self.state, self.acting = size, state, found
             state = self.stepper.state()
 
     def values(self, eps: float) -> Array:
@@ -57,33 +56,19 @@ class Standing:
         """A row for each eps, and what is taken for the true A and B."""
         values, halved = ([self.values(eps / part) for eps in SIZES] for part in (1.0, 2.0))
         errors, truth = errors_of(values, halved, self.stepper.model.nv)
-        acting, rows = "; ".join(sorted(self.acting)), list[ContactRow]()
+        names, rows = "; ".join(sorted(self.acting)), list[ContactRow]()
         for eps, error in zip(SIZES, errors):
             rows.append(
-                ContactRow(self.name, acting, eps, number(error), "; ".join(sorted(self.changed_by(eps))))
+                ContactRow(self.name, names, eps, number(error), "; ".join(sorted(self.changed_by(eps))))
             )
         return rows, truth
 
     def changed_by(self, eps: float) -> set[str]:
         """What acts otherwise where a position is moved by eps."""
         m, changed = self.stepper.model, set[str]()
-        for by in (*np.eye(m.nv), *-np.eye(m.nv)):
-            data = self.stepper.put(self.state)
-            mujoco.mj_integratePos(m, data.qpos, by, eps)
-            mujoco.mj_forward(m, data)
-            changed |= acting_in(m, data) ^ self.acting
+        for by in eps * np.vstack([np.eye(m.nv, 2 * m.nv + m.na), -np.eye(m.nv, 2 * m.nv + m.na)]):
+            changed |= acting(m, self.stepper.forward(self.state, by)) ^ self.acting
         return changed
-
-
-def acting_in(m: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
-    """The pairs of geoms that touch, with the number of their contacts, and the limits that act."""
-    pairs = [tuple(sorted(pair)) for pair in data.contact.geom[data.contact.efc_address >= 0].tolist()]
-    names = {pair: " and ".join(element_name(m, "geom", geom) for geom in pair) for pair in pairs}
-    found = {f"{name} ({pairs.count(pair)})" for pair, name in names.items()}
-    rows = zip(data.efc_type.tolist(), data.efc_id.tolist())
-    return found | {
-        f"limit of {element_name(m, LIMITS[kind], owner)}" for kind, owner in rows if kind in LIMITS
-    }
 
 
 def errors_of(values: Sequence[Array], halved: Sequence[Array], nv: int) -> tuple[list[float], Array | None]:
@@ -124,16 +109,15 @@ def not_moved(values: Array, truth: Array, units: Array) -> Array:
     return np.array(found).reshape(-1, n)
 
 
-def directions(m: mujoco.MjModel, vectors: Array) -> list[str]:
-    """The joints that have most part in each direction; of a free one also along or about which axis."""
-    names = []
+def directions(stepper: Stepper, vectors: Array) -> list[str]:
+    """The joints that have most part in each direction; of a free one and a ball also along or about which axis."""
+    m, names = stepper.model, list[str]()
     for vector in vectors:
         moved, speeds = vector[: m.nv], vector[m.nv : 2 * m.nv]
         part, directed = moved if moved.max() > SMALL * speeds.max() else speeds, []
         for dof in np.flatnonzero(part >= 0.5 * part.max()).tolist():
             joint = m.dof_jntid[dof]
-            axes = FREE_PARTS if m.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE else [""]
-            axis = axes[(dof - m.jnt_dofadr[joint]) % len(axes)]
+            axis = AXES.get(kind_of(m, joint), [""])[dof - m.jnt_dofadr[joint]]
             directed.append(f"{element_name(m, 'joint', joint)} {axis}".strip())
         names.append(" with ".join(directed))
     return names

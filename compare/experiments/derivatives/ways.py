@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby, product
 
-import mujoco
 import numpy as np
 
 import tmt
@@ -110,10 +109,11 @@ class Subject:
             data.qpos[dynamics.qpos], data.qvel[dofs] = self.q[k], self.qd[k]
             data.qfrc_applied[dofs] = self.tau[k] - dynamics.constant
             self.starts.append(self.stepper.state())
-            for (k_input, place), by in product(enumerate(self.inputs), (1.0, -1.0)):  # forces are affine
-                getattr(self.stepper.put(self.starts[k]), self.by)[place] += by
-                mujoco.mj_forward(m, data)
-                self.gains[k, :, k_input] += 0.5 * by * (data.qfrc_actuator + data.qfrc_applied)[dofs]
+            for (number, place), by in product(enumerate(self.inputs), (1.0, -1.0)):  # forces are affine
+                state = self.starts[k].copy()
+                state[self.stepper.places[self.by]][place] += by
+                moved = self.stepper.forward(state)
+                self.gains[k, :, number] += 0.5 * by * (moved.qfrc_actuator + moved.qfrc_applied)[dofs]
 
     def by_differences(self, eps: float, centred: bool) -> Array:
         """MuJoCo's [A B] at all states, (states, 2 nv, 2 nv + k)."""

@@ -17,11 +17,12 @@ from ...core.timing import fastest
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.motion import Scene
 from ...engines.mujoco.reading import Reading, read
-from ...engines.mujoco.smaller import Smaller, assets_of, files_of, of_parts
+from ...engines.mujoco.smaller import Smaller, files_of, of_parts
 from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit
 from ...judge.scale import EPS, FACTOR
+from ...process.writing import assets_of, draft_of, move
 from ...robots import Robot
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
@@ -31,8 +32,7 @@ from .. import Experiment
 from ..setup import Setup
 from .records import JointRow, ModelRow, UseRow
 from .scene import scene_of, scene_of_case
-from .search import TEXT, Locks, lockable, take_out
-from .written import draft_of, move, written
+from .search import TEXT, Locks, lockable, take_out, written
 
 EXPERIMENT = Experiment(
     order=110,

@@ -1,15 +1,16 @@
 """What a scene does not need: what goes for nothing, and the joints that can be locked for an error."""
 
 from collections.abc import Sequence
+from pathlib import Path as File
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 
 from ...core.text import block
 from ...engines.mujoco.motion import Path, Scene, joints
 from ...engines.mujoco.names import kind_of
-from ...engines.mujoco.smaller import FREE, Smaller, locked, tied_joints
+from ...engines.mujoco.smaller import FREE, Smaller, finished, locked, tied_joints
+from ...engines.mujoco.source import Source
 from .records import FreeRow, JointRow
 
 TEXT = "reduction"  # the template
@@ -93,19 +94,23 @@ def starts(scene: Scene) -> dict[str, tuple[float, ...]]:
 
     Then the joint is where it starts and at rest, and the others are at states of the motion.
     """
-    stepper, places = scene.stepper, joints(scene.whole.model)
-    largest = np.zeros((len(places), 3))
+    stepper, of_joints = scene.stepper, joints(scene.whole.model)
+    places, largest = stepper.places, np.zeros((len(of_joints), 3))
     for roll, path in zip(scene.rolls, scene.paths):
-        data = stepper.put(roll.state)
-        mujoco.mj_forward(stepper.model, data)
-        first = data.qacc.copy()
-        for row, (of_q, of_v) in zip(largest, places.values()):
-            row[:2] = np.maximum(row[:2], [np.abs(path.v[0, of_v]).max(), np.abs(first[of_v]).max()])
+        first = np.abs(stepper.forward(roll.state).qacc)
+        for row, (of_q, of_v) in zip(largest, of_joints.values()):
+            row[:2] = np.maximum(row[:2], [np.abs(path.v[0, of_v]).max(), first[of_v].max()])
             for k in np.linspace(0, len(path.q) - 1, SAMPLES).astype(int):
-                data.qpos[:], data.qvel[:] = path.q[k], path.v[k]
-                data.qpos[of_q], data.qvel[of_v] = path.q[0, of_q], 0.0
+                state = roll.state.copy()
+                state[places["qpos"]], state[places["qvel"]] = path.q[k], path.v[k]
+                state[places["qpos"]][of_q], state[places["qvel"]][of_v] = path.q[0, of_q], 0.0
                 if roll.controls is not None:
-                    data.ctrl[:] = roll.controls[min(k, roll.steps - 1)]
-                mujoco.mj_forward(stepper.model, data)
-                row[2] = max(row[2], np.abs(data.qacc[of_v]).max())
-    return {name: tuple(row) for name, row in zip(places, largest.tolist())}
+                    state[places["ctrl"]] = roll.controls[min(k, roll.steps - 1)]
+                row[2] = max(row[2], np.abs(stepper.forward(state).qacc[of_v]).max())
+    return {name: tuple(row) for name, row in zip(of_joints, largest.tolist())}
+
+
+def written(scene: Scene, small: Smaller, path: File, comment: str) -> Smaller:
+    """Write a model with the starts of the scene's motions as its keyframes; what is read again."""
+    finished(small, scene.starts(small)).write(path, comment)
+    return Smaller.whole(Source(path))

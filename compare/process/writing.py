@@ -1,4 +1,4 @@
-"""The smaller file: where it may be written, and how it replaces an earlier one."""
+"""Where a file may be written, and how it replaces an earlier one that this program wrote."""
 
 import os
 import tempfile
@@ -6,43 +6,42 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ...core.text import block
-from ...engines.mujoco.motion import Scene
-from ...engines.mujoco.smaller import Smaller, assets_of, finished, is_written
-from ...engines.mujoco.source import Source
-from ...report.folder import OWN
-
-TEXT = "reduction"  # the template
+MOST = 1000  # bytes of a first line that are looked at
 
 
-def written(scene: Scene, small: Smaller, path: Path, comment: str) -> Smaller:
-    """Write a model with the starts of the scene's motions as its keyframes; what is read again."""
-    finished(small, scene.starts(small)).write(path, comment)
-    return Smaller.whole(Source(path))
+def has_mark(path: Path, mark: str) -> bool:
+    """Whether this program wrote a file: a comment in its first line has this mark."""
+    with open(path, "rb") as file:
+        first = file.readline(MOST)
+    return path.suffix == ".xml" and first.startswith(b"<!--") and mark.encode() in first
 
 
-def refusal(path: Path, needed: Iterable[Path], report: Path) -> str:
-    """Why a smaller file cannot be written to a path, in one line; "" if it can.
+def assets_of(path: Path) -> Path:
+    """The folder of the assets of a written file."""
+    return path.with_name(f"{path.stem}_assets")
 
-    needed: the files that the model needs, which are never written to. report: the folder of the report, whose
-    files the next report replaces. Only a file that this program wrote is replaced.
+
+def why_not(path: Path, needed: Iterable[Path], reserved: Iterable[Path], mark: str) -> str:
+    """Why a file cannot be written to a path, as a key or as the system says it; "" if it can.
+
+    needed: files that are never written to. reserved: files and folders that something else replaces. mark: in the
+    first line of what may be replaced.
     """
-    assets, of_report = assets_of(path), [report.resolve() / name for name in OWN]
-    rules = {  # by the names that the template has
+    rules = {
         "link": path.is_symlink,
         "folder": path.is_dir,
         "no_folder": lambda: not path.parent.is_dir(),
         "not_regular": lambda: path.exists() and not path.is_file(),
         "needed": lambda: path.exists() and any(file.exists() and path.samefile(file) for file in needed),
-        "foreign": lambda: path.exists() and not is_written(path),
+        "foreign": lambda: path.exists() and not has_mark(path, mark),
         "read_only": lambda: path.exists() and not os.access(path, os.W_OK),
-        "report": lambda: any(path.resolve().is_relative_to(part) for part in of_report),
-        "assets": lambda: os.path.lexists(assets) and not assets.is_dir(),
+        "report": lambda: any(path.resolve().is_relative_to(part.resolve()) for part in reserved),
+        "assets": lambda: os.path.lexists(assets_of(path)) and not assets_of(path).is_dir(),
     }
     try:
         for why, applies in rules.items():
             if applies():
-                return block(TEXT, "refusal", why=why, assets=assets.name)
+                return why
         with tempfile.TemporaryFile(dir=path.parent):
             return ""
     except (OSError, ValueError) as error:  # a name that is too long, a folder that is read-only
