@@ -1,4 +1,4 @@
-"""MuJoCo's own functions at one state: derivatives by differences, and loops of calls for timing.
+"""Loops of calls of MuJoCo's own functions at one state, for timing.
 
 In a loop there is no Python: the functions of the C library are called by their addresses, from LLVM's text.
 """
@@ -13,33 +13,10 @@ import numpy as np
 
 from tmt.compiled.machine import Library
 
-from .dynamics import Array, MujocoDynamics
+from .dynamics import MujocoDynamics
 from .names import bit
 
-Call = Callable[[], np.ndarray]
 Run = Callable[[int], np.ndarray]  # how many times
-
-
-def of_steps(
-    dynamics: MujocoDynamics, q: Array, v: Array, tau: Array, dt: float, integrator: str, centred: bool,
-    eps: float,
-) -> Call:  # fmt: skip
-    """A call of mj_step from states nearby: [A B] (2 nv, 3 nv) of a step of any integrator, B by torque."""
-    n, coordinates = len(dynamics.dofs), dynamics.coordinates
-
-    def ends(size: float) -> tuple[np.ndarray, np.ndarray]:
-        """The state after the step from each nudged state."""
-        nudges = size * np.eye(3 * n)
-        start = coordinates.move(np.asarray(q), nudges[:, :n])
-        motion = dynamics.run(start, v + nudges[:, n : 2 * n], tau + nudges[:, 2 * n :], dt, 1, integrator)
-        return motion.q[:, 1], motion.v[:, 1]
-
-    def call() -> np.ndarray:
-        (q1, v1), (q0, v0) = ends(eps), ends(-eps if centred else 0.0)
-        moved = np.concatenate([coordinates.difference(q1, q0), v1 - v0], axis=1)
-        return moved.T / ((1 + centred) * eps)
-
-    return call
 
 
 def library() -> str | None:
