@@ -152,22 +152,17 @@ def set_control(m: mujoco.MjModel, actuator: int, u: float, ctrl: np.ndarray, ac
         act[m.actuator_actadr[actuator]] = u
 
 
-def reflected(m: mujoco.MjModel, field: str) -> np.ndarray:
-    """A number of the actuators at joints, times gear squared, at the speeds of their joints, (nv,).
+def rotors(m: mujoco.MjModel) -> np.ndarray:
+    """Armature of actuators at joints, times gear squared, at the speeds of their joints, (nv,), kg m2 or kg.
 
     MuJoCo takes the first number of the gear for every speed of the joint.
     """
     diagonal = np.zeros(m.nv)
-    for i in map(int, np.flatnonzero(getattr(m, field, np.zeros(0)))):
+    for i in map(int, np.flatnonzero(getattr(m, "actuator_armature", np.zeros(0)))):
         if mujoco.mjtTrn(m.actuator_trntype[i]) in OF_A_JOINT:
-            added = getattr(m, field)[i] * m.actuator_gear[output_of(m, i), 0] ** 2
+            added = m.actuator_armature[i] * m.actuator_gear[output_of(m, i), 0] ** 2
             diagonal[m.dof_jntid == m.actuator_trnid[i, 0]] += added
     return diagonal
-
-
-def rotors(m: mujoco.MjModel) -> np.ndarray:
-    """Armature of actuators times gear squared, (nv,), kg m2 or kg."""
-    return reflected(m, "actuator_armature")
 
 
 def matrix(quat: ArrayLike) -> np.ndarray:
