@@ -7,7 +7,6 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-import tmt
 from tmt.compiled import Evaluator
 
 from ...core import timing
@@ -50,21 +49,22 @@ def loops(setup: Setup) -> list[Loop]:
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
-    ready = at_many_states(tree, *(values[:FEW] for values in states))
+    compiled = Evaluator(tree, "acceleration")
+    operations = compiled.operations
+    ready = at_many_states(compiled, operations, *(values[:FEW] for values in states))
     dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
     of_mujoco = calls.loops(dynamics, *(values[0] for values in states)).items()
     ready += [Loop(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
     for loop in ready:
         loop.run(1)  # its code is compiled, or loaded, on the first call
-    return ready + (at_many_states(tree, *states) if many > FEW else [])
+    return ready + (at_many_states(compiled, operations, *states) if many > FEW else [])
 
 
-def at_many_states(tree: tmt.Tree, *states: np.ndarray) -> list[Loop]:
+def at_many_states(compiled: Evaluator, operations: int, *states: np.ndarray) -> list[Loop]:
     """The ways of tmt over many states, q (N, nq), qd and tau (N, nv)."""
-    compiled = Evaluator(tree, "acceleration")
     out, ways = np.empty((len(states[0]), compiled.size)), []
     for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
-        row = EvaluationRow(FORWARD, name, len(out), operations=compiled.operations)
+        row = EvaluationRow(FORWARD, name, len(out), operations=operations)
         ways.append(Loop(row, repeated(partial(compiled.fill, in_lanes, out, *states))))
     return ways
 
