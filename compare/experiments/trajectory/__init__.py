@@ -82,7 +82,6 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
         result.rows += part.rows
         result.checks += part.checks
         result.runs += part.runs
-    errors.find_departures(result, robot)
     errors.find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
     if rows := [row for row in result.of_beginnings if row.level == "open loop"]:

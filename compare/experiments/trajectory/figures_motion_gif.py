@@ -100,30 +100,21 @@ def drawn(run: Run, label: str) -> Iterator[Image.Image]:
     ax.set_axis_off()
     names = (label, LABELS["mujoco"])
     lines = [ax.plot([], [], label=name, **look)[0] for name, look in zip(names, LOOKS)]  # type: ignore[arg-type]
-    slower = MILLISECONDS / 1e3 / float(t[1] - t[0])
-    method = f"{run.integrator}, {step_in_words(case, run.steps)}"
     figure.text(0.02, 0.93, case.name, fontsize=14, parse_math=False)  # a name is no formula
-    figure.text(0.02, 0.87, said("run", run=method, slower=1.0 if 0.9 < slower < 1.1 else slower))
+    figure.text(0.02, 0.87, f"{run.integrator}, {step_in_words(case, run.steps)}")
     figure.legend(loc="upper right", ncols=2, markerscale=0.5)
     status = figure.text(0.02, 0.04, "", parse_math=False)
     canvas.draw()
-    background = canvas.copy_from_bbox(
-        figure.bbox
-    )  # a picture is drawn over it, which takes a tenth of the time
+    background = canvas.copy_from_bbox(figure.bbox)  # over which each picture draws the sticks alone
     for k, time in enumerate(t):
         for line, path in zip(lines, paths.values()):
             line.set_data(*path[k].T)
         lost = [LABELS[name] for name, path in paths.items() if not np.isfinite(path[k, 0]).all()]
-        left = {
-            LABELS[name]: path.left for name, path in run.paths.items() if path.left and path.left <= time
-        }
-        left = left if case.is_held else {}
-        status.set_text(said("status", t=time, lost=lost, apart=apart[k], unit=unit, left=left))
+        gone = run.paths.items() if case.is_held else ()
+        left = {LABELS[name]: path.left for name, path in gone if path.left and path.left <= time}
+        values = {"t": time, "lost": lost, "apart": apart[k], "unit": unit, "left": left}
+        status.set_text(say(Finding("trajectory", "picture_status", values)))
         canvas.restore_region(background)
         for artist in (*lines, status):
             figure.draw_artist(artist)
         yield Image.fromarray(np.asarray(canvas.buffer_rgba())).quantize(32, Image.Quantize.FASTOCTREE)
-
-
-def said(kind: str, **values: object) -> str:
-    return say(Finding("trajectory", f"picture_{kind}", values))

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import tmt
 from compare.core.text import say, screen
 from compare.engines import GRID, Method, Motion, Setting
 from compare.engines.outside.file import EngineError, TooLong
@@ -199,7 +200,10 @@ class Slow:
         self.asked.append((method, setting.steps))
         if method in self.refused:
             raise self.refused[method]
-        states = np.tile(q, (GRID + 1, 1)), np.tile(v, (GRID + 1, 1))
+        states = (
+            np.tile(q, (GRID + 1, 1)),
+            np.tile(v + 1.0, (GRID + 1, 1)),
+        )  # it stays, and has an energy of motion
         motion = Motion(np.linspace(0.0, 5.0, GRID + 1), *states, seconds_alone=self.seconds[setting.steps])
         return lambda: None, lambda _: motion
 
@@ -222,7 +226,7 @@ def test_after_a_run_beyond_the_budget_there_is_no_finer_one(budget, steps):
     stays = KNOWN.error(np.tile(HELD.q, (GRID + 1, 1)))
     assert rows[0].worst_error == pytest.approx(stays.max()) and rows[0].error == pytest.approx(stays[-1])
     assert rows[0].early_error == pytest.approx(stays[:13].max())  # up to 12 / 64 of 5 s
-    assert rows[0].energy_error < 1e-9  # of a motion without damping
+    assert rows[0].energy_error == pytest.approx(tmt.mass_matrix(HELD.q, HELD.tree).sum() / 2.0)
 
 
 def test_a_method_that_an_engine_refuses_is_a_row_and_an_engine_without_an_answer_is_not_asked_again():

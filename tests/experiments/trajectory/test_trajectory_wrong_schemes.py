@@ -97,7 +97,7 @@ def test_wrong_gains_leave_the_band(of, name, wrong, integrator, gripper, monkey
 
 @pytest.mark.parametrize("seconds, left_out", [(1e-6, []), (2.0, ["open, let go", "open, let go, damped"])])
 def test_equations_of_ones_own_have_no_servos_and_follow_what_there_is_time_for(seconds, left_out, gripper):
-    equations = SimpleNamespace(has=lambda name: True, times={"acceleration": (seconds * 1e-2,)})
+    equations = SimpleNamespace(has=lambda name: True, times={"acceleration": seconds * 1e-2})
     own, cases = Own(equations), gripper[0].robot.cases
     found = cases_left_out(SimpleNamespace(own=own, size="full"), cases)
     servos = [case.name for case in cases if case.controller]
