@@ -132,6 +132,19 @@ def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(insid
         assert len(said) == status and all(0 < line.index("-9.81 ") < line.index("-9.8 ") for line in said)
 
 
+def test_the_answer_as_json_is_all_that_is_printed_and_the_page_is_opened(inside, tmp_path, capsys, monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    path, out = tmp_path / "two.xml", tmp_path / "out"
+    path.write_text(XML.replace('mass="1.5"', 'mass="1.6"'))
+    for more, status in (["--json"], 1), (["--json", "--open", "--reference", "model"], 0):
+        assert main(["parameters", "--quick", "--mjcf", str(path), "--out", str(out), *more]) == status
+        answer, results = json.loads(capsys.readouterr().out), results_in(out)
+        assert answer["passed"] == results["passed"] == (not status) and answer["causes"] == results["causes"]
+        assert ("mass (forearm)" in answer["answer"][0]) == bool(status)
+    assert opened == [(out / "index.html").as_uri()] and answer["report"] == str(out / "index.html")
+
+
 SERVO = """<mujoco model="tail"><option timestep="0.002"/><worldbody><body><joint name="swing" axis="0 1 0" damping="0.01"/>
   <geom type="sphere" size="0.1" pos="0 0 -0.5" mass="2"/></body></worldbody>
   <actuator><position joint="swing" kp="50" kv="800"/></actuator></mujoco>"""

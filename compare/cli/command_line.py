@@ -95,6 +95,8 @@ class Option(NamedTuple):
 OPTIONS = {
     "--out": Option(metavar="DIR", default="reports/latest", of_every=True),
     "--quick": Option(None, of_every=True),
+    "--open": Option(None, of_every=True),
+    "--json": Option(None, of_every=True),
     "--mjcf": Option(metavar="FILE", of_every=True),
     "--floating": Option(None, of_every=True),
     "--reference": Option(stated_reference, "WHAT", of_every=True),

@@ -24,8 +24,8 @@ EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the c
 class Terminal:
     """Prints lines on stdout, and the progress on stderr if that is a terminal."""
 
-    def __init__(self) -> None:
-        self.out, self.err = Stream(sys.stdout), Stream(sys.stderr)
+    def __init__(self, is_silent: bool = False) -> None:
+        self.out, self.err = Stream(None if is_silent else sys.stdout), Stream(sys.stderr)
         self.lines, self.screen = console(self.out), console(self.err)
         self.status: Status | None = None
         self.text, self.since = "", time.monotonic()

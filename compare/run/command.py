@@ -2,8 +2,11 @@
 
 import argparse
 import importlib
+import json
 import os
+import sys
 import time
+import webbrowser
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -16,6 +19,7 @@ from ..engines.mujoco import ModelError
 from ..engines.own import OwnError
 from ..experiments import EXPERIMENTS, skipped
 from ..process import interrupt
+from ..process.streams import Stream
 from ..process.workers import WorkerEnded, start_workers
 from ..report.folder import UNCHANGED, exchange, has_report, new_report
 from ..report.terminal import Terminal
@@ -36,7 +40,7 @@ INTERRUPTED = "interrupted"  # folder in that of an earlier report
 
 def carry_out(options: argparse.Namespace, command: str) -> int:
     """Compare the models and write the report; the exit status. Refused: that is not possible."""
-    started, terminal, is_alone = time.perf_counter(), Terminal(), options.experiment != "all"
+    started, terminal, is_alone = time.perf_counter(), Terminal(options.json), options.experiment != "all"
     given, path = options.mjcf or "", os.path.abspath(options.mjcf) if options.mjcf else None
     out = Path(options.out).absolute()  # a user's own code may change the current folder
     for name in ("scenes", "controls", "write"):
@@ -62,6 +66,17 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     page, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
     terminal.say(block("run", "report", path=page, seconds=seconds))
     terminal.say_lines(report.answer if is_alone else ())
+    if options.json:
+        answer = {
+            "passed": report.passed,
+            "verdict": report.verdict.split("\n"),
+            "answer": report.answer,
+            "causes": [cause.record() for cause in report.causes],
+            "report": page,
+        }
+        print(json.dumps(answer, indent=1), file=Stream(sys.stdout), flush=True)
+    if options.open:
+        webbrowser.open((out / "index.html").as_uri())
     return 0 if report.passed else 1
 
 
@@ -134,7 +149,8 @@ def write_report(
 
     sections, causes, needless = examined
     reference, robot, *_ = compared
-    count, subject = len(interrupted or EXPERIMENTS) - len(needless), block("run", "subject", kind=reference.kind)
+    count = len(interrupted or EXPERIMENTS) - len(needless)
+    subject = block("run", "subject", kind=reference.kind)
     words = verdict.verdict(sections, count, causes, subject, robot.name)
     left_out = reasons | needless
     if interrupted:
