@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -143,7 +144,8 @@ def test_results_have_every_check_cause_and_digit(folder):
     write(folder, report_of(folder, [of], [CAUSE]))
     results = json.loads(text_of(folder / "results.json"))
     assert results["passed"] is False and [check["passed"] for check in results["checks"]] == [True, False]
-    assert results["causes"] == [CAUSE.record()]
+    assert results["causes"] == [CAUSE.record()] and CAUSE.record()["found"] == 1.6
+    assert replace(CAUSE, explains=float("nan")).record()["found"] is None  # JSON has no other word for it
     lines = text_of(folder / "tables" / "mass.csv").splitlines()
     assert lines == ["a,b,engine,ok", *(f"{row['a']!r},{row['b']},tmt,true" for row in rows)]
     assert pd.read_csv(folder / "tables" / "extra.csv")["names"].tolist() == [names]

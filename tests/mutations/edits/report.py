@@ -43,6 +43,13 @@ EDITS = (
     ("verdict", "Report.passed", "self.is_complete and _1", "_1", "what was interrupted has passed"),
     ("run.command", "compute", "has_report(_1)", "False", "an earlier report gives way to one that is not complete"),
     ("run.examine", "Run.finished", "name in self.clock.ended", "True", "what is under way is reported as finished"),
+    ("process.streams", "Capped.write", "MOST_PRINTED - Capped.printed", "MOST_PRINTED", "own code prints without end"),
+    ("process.streams", "Capped.write", "len(text) > room", "False", "nobody is told that no more is printed"),
+    ("core.cause", "Cause.record", "not isfinite(value)", "False", "a cause that is no number spoils results.json"),
+    ("run.command", "carry_out", "Path(options.out).absolute()", "Path(options.out)", "own code moves the report"),
+    ("report.tables", "text_of", "math.isfinite(value)", "True", "a table shows nan"),
+    ("process.workers", "Clock.of", "self.task = before", "pass", "what follows a task counts for it"),
+    ("process.workers", "Workers.start", "Current.clock.taken.append(_1)", "None", "what other processes compute is not counted"),
     # the first screen, and what is shown of a long table
     ("report.tables", "of_checks", "record if record['judged'] else _1", "record", "what was not judged has no word for it"),
     ("report.document", "Document.first_screen", "failures(report.sections)", "failures(report.sections)[:1]",
