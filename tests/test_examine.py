@@ -2,9 +2,11 @@
 
 import json
 import sys
+from contextlib import ExitStack
 from functools import partial
 from types import SimpleNamespace
 
+import pytest
 from in_process import InProcess, without_workers
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
@@ -16,6 +18,7 @@ from compare.core.check import Result
 from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
 from compare.experiments.setup import Request
+from compare.process import interrupt
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 from compare.run import command
@@ -89,6 +92,38 @@ def test_a_report_that_cannot_be_made_is_one_line_and_the_earlier_one_is_whole(t
         status, _ = ran(tmp_path, "odd")
     assert status == 2 and "AttributeError" in capsys.readouterr().err
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
+
+
+@pytest.mark.parametrize("is_earlier", [False, True])
+def test_after_an_interrupt_what_is_finished_is_reported_and_an_earlier_report_stays(tmp_path, monkeypatch, is_earlier):
+    def first(setup):
+        result = Result("first", shown=[])
+        result.check("zero", "a", 0.5, 1.0, "m")
+        return result
+
+    def second(setup):
+        monkeypatch.setattr(interrupt.Now, "is_interrupted", True)
+        interrupt.at_end.close()  # as the main thread does
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(interrupt, "at_end", ExitStack())
+    for name, rows in {"first": first, "second": second}.items():
+        made(monkeypatch, name, rows=rows)
+    only(monkeypatch, "first", "second")
+    earlier, place = tmp_path / "out" / "results.json", tmp_path / "out"
+    if is_earlier:
+        place.mkdir()
+        earlier.write_text('{"provenance": {"files": ["results.json"]}}')
+        place = place / "interrupted"
+    before = earlier.read_text() if is_earlier else ""
+    with without_workers(), pytest.raises(KeyboardInterrupt):
+        ran(tmp_path, "all")
+    results = json.loads((place / "results.json").read_text())
+    assert [check["experiment"] for check in results["checks"]] == ["first"] and not results["passed"]
+    assert [skipped["experiment"] for skipped in results["skipped"]] == ["second"]
+    assert not is_earlier or earlier.read_text() == before
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == ({"results.json", "interrupted"} if is_earlier else names) and not any(".new" in name for name in names)
 
 
 def test_a_problem_of_a_users_function_is_told_once_by_an_experiment_that_asks_it():
