@@ -28,22 +28,21 @@ from .warp import methods_for as methods_of_warp
 ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton",
                       reads_file=True, precision="float32")  # fmt: skip
 FEATHERSTONE, BY_MUJOCO = "Featherstone", "SolverMuJoCo"  # of its solvers
-USED = "implicitfast", "RK4"  # integrators of SolverMuJoCo; the others are those of MuJoCo Warp too
 UNCONSTRAINED = 0b11111  # MuJoCo's flags that disable all constraints
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
 PASSIVE = "damping", "stiffness"
 
 
-def by_mujoco(methods: dict[str, tuple[int, str]]) -> dict[str, tuple[int, str]]:
-    return {f"{BY_MUJOCO} {name}": methods[name] for name in USED}
-
-
-METHODS = {FEATHERSTONE: (1, "newton_featherstone")} | by_mujoco(OF_WARP)
+METHODS = {FEATHERSTONE: (1, "newton_featherstone")}  # semi-implicit Euler whose damping is explicit
+METHODS |= {
+    f"{BY_MUJOCO} {name}": OF_WARP[name] for name in ("implicitfast", "RK4")
+}  # others are MuJoCo Warp's too
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
-    """Featherstone is semi-implicit Euler whose damping is explicit; SolverMuJoCo has the integrators of MuJoCo Warp."""
-    return METHODS | by_mujoco(methods_of_warp(tree))
+    """SolverMuJoCo has the integrators of MuJoCo Warp."""
+    of_warp = {f"{BY_MUJOCO} {name}": method for name, method in methods_of_warp(tree).items()}
+    return {name: of_warp.get(name, method) for name, method in METHODS.items()}
 
 
 class Model(ReadModel):
@@ -114,20 +113,14 @@ class Model(ReadModel):
         self.set_state(at)
         arrays = self.state.body_q, self.model.body_mass, self.model.body_com, self.model.body_inertia
         numbers, links = [array.numpy().astype(float) for array in arrays], []
-        of_joints = (
-            self.model.joint_type.numpy(),
-            self.model.joint_parent.numpy(),
-            self.children,
-            self.firsts,
-            self.firsts[1:],
-        )
-        for kind, parent, child, first, end in zip(*of_joints):
+        kinds, parents = self.model.joint_type.numpy(), self.model.joint_parent.numpy()
+        for k, child in enumerate(self.children):
             x, *body = (array[child] for array in numbers)
             # of several joints the last moves the body
-            last = max((dof for dof in range(first, end) if dof in self.joint_at), default=None)
-            joint = None if kind == self.newton.JointType.FIXED or last is None else self.joint_at[last]
+            last = max(filter(self.joint_at.__contains__, range(*self.firsts[k : k + 2])), default=None)
+            joint = None if kinds[k] == self.newton.JointType.FIXED or last is None else self.joint_at[last]
             turn = Rotation.from_quat(x[3:]).as_matrix()
-            links.append(Link(int(child), int(parent), joint, turn, x[:3], Body(*body)))
+            links.append(Link(int(child), int(parents[k]), joint, turn, x[:3], Body(*body)))
         return links
 
     def set_body(self, link: Link, body: Body) -> None:
@@ -167,9 +160,7 @@ class Model(ReadModel):
         is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
         is_damped = self.used["damping"][self.order.is_of_free()].any()
         if method == FEATHERSTONE and (is_damped or self.used["stiffness"][is_of_ball].any()):
-            raise EngineError(
-                "the Featherstone solver has no springs of ball joints and no damping of free joints"
-            )
+            raise EngineError("Featherstone has no springs of ball joints and no damping of free joints")
         self.set_state(at)
         self.method, self.dt = method or FEATHERSTONE, dt
 

@@ -83,9 +83,8 @@ class Model(ReadModel):
                 plant.WeldFrames(plant.world_frame(), plant.get_body(body).body_frame())
         rotors = {}
         for actuator in map(plant.get_joint_actuator, plant.GetJointActuatorIndices()):
-            rotors[actuator.joint().name()] = (
-                actuator.default_reflected_inertia()
-            )  # of several the last counts
+            # of several the last counts
+            rotors[actuator.joint().name()] = actuator.default_reflected_inertia()
             plant.RemoveJointActuator(actuator)
         for constraint in plant.GetConstraintIds():
             plant.RemoveConstraint(constraint)

@@ -1,7 +1,6 @@
 """Engines that take the model that MuJoCo compiles."""
 
 from abc import abstractmethod
-from functools import cached_property
 from operator import attrgetter
 from typing import Any, ClassVar
 
@@ -17,16 +16,7 @@ from .order import Order
 
 METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
 STAGES = {"Euler": 1, "implicitfast": 1, "implicit": 1, "discrete": 1, "RK4": 4}
-BODIES = (
-    "body_mass",
-    "body_inertia",
-    "body_pos",
-    "body_quat",
-    "body_ipos",
-    "body_iquat",
-    "jnt_axis",
-    "jnt_pos",
-)
+BODIES = "body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "jnt_axis", "jnt_pos"
 
 
 class OfCompiled(ReadModel):
@@ -68,13 +58,7 @@ class OfCompiled(ReadModel):
                 self.missing[name] = f"it does not have what it needs: {error}"
         if not models:
             raise Unread(next(iter(self.missing.values())))
-        self.models = models
-        self.__dict__.pop("first", None)
-
-    @cached_property
-    def first(self) -> Any:
-        """The model of the first method."""
-        return next(iter(self.models.values()))
+        self.models, self.first = models, next(iter(models.values()))
 
     @abstractmethod
     def put_model(self, model: Any) -> Any:
