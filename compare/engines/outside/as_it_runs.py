@@ -89,11 +89,15 @@ def run(
             iterations,
             max(LS_ITERATIONS, model.opt.ls_iterations),
         )
-    return one_run(kind, file, model, BEYOND[precision])
+    return one_run(kind, file, model, precision)
 
 
 def one_run(
-    kind: Callable[[File, Any], Stepper], file: File, model: mujoco.MjModel, beyond: float, steps: int = STEPS
+    kind: Callable[[File, Any], Stepper],
+    file: File,
+    model: mujoco.MjModel,
+    precision: str,
+    steps: int = STEPS,
 ) -> Run:
     """Steps from the first keyframe with its controls, else from qpos0."""
     begin, engine, data = time.process_time(), kind(file, model), mujoco.MjData(model)
@@ -101,45 +105,67 @@ def one_run(
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)  # for the warm start
     free, apart = engine.put(data), dict[int, float]()
-    pairs = list[tuple[dict[str, Array], dict[str, Array]]]()
+    made, moved = list[Fields](), mujoco.MjData(model)
     for step in range(1, steps + 1):
         other = engine.get(engine.step(engine.put(data)))
         free = engine.step(free)
+        mujoco.mj_copyState(model, data, moved, mujoco.mjtState.mjSTATE_INTEGRATION)
+        for values in (moved.qpos, moved.qvel):  # by the rounding of the precision, up and down in turns
+            values *= 1.0 + np.finfo(precision).eps * (-1.0) ** np.arange(values.size)
+        mujoco.mj_step(model, moved)
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qacc).all():
             break
-        pairs.append((fields(model, data), fields(engine.model, other)))
+        made.append(Fields(fields(model, data), fields(model, moved), fields(engine.model, other)))
         if step in LISTED:
             apart[step] = float(np.abs(data.qpos - engine.get(free).qpos).max())
-    of_fields = compared(model, pairs, beyond)
+    of_fields = compared(model, made, BEYOND[precision])
     seconds = time.process_time() - begin
     return Run(int(model.opt.iterations), int(model.opt.ls_iterations), apart, *of_fields, seconds)
 
 
+class Fields(NamedTuple):
+    """The fields of a step: MuJoCo's, those from a state that is moved by its rounding, the engine's."""
+
+    mine: dict[str, Array]
+    moved: dict[str, Array]
+    others: dict[str, Array]
+
+    def distance(self, name: str, others: dict[str, Array]) -> Array:
+        """Of each entry of a field; infinite where it has others, or is not a number."""
+        values = self.mine[name]
+        if values.shape != others[name].shape:
+            return np.array([np.inf])
+        return np.nan_to_num(np.abs(values - others[name]), nan=np.inf).ravel()
+
+
 def compared(
-    model: mujoco.MjModel, pairs: Sequence[tuple[dict[str, Array], dict[str, Array]]], beyond: float
+    model: mujoco.MjModel, made: Sequence[Fields], beyond: float
 ) -> tuple[Difference | None, dict[str, float], float]:
-    """first, largest and over of a Run. pairs: fields of MuJoCo and of the engine."""
+    """first, largest and over of a Run.
+
+    A field may differ by `beyond` of its largest entry, and by FACTOR times what the rounding of the state makes of it: the
+    distance of a contact is a small difference of positions, and a force at rest follows from that.
+    """
     names, over, first, largest = names_of(model), 0.0, None, dict[str, float]()
     # of Runge and Kutta's stages MuJoCo leaves the mean in qacc, others the last: "qvel after" says the same
     is_mean = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
     listed = [name for name in FIELDS if not (name == "qacc" and is_mean)]
-    peaks = {name: max(size(mine[name]) for mine, _ in pairs) for name in listed if pairs}
-    for step, (mine, others) in enumerate(pairs, 1):
+    peaks = {name: max(size(of.mine[name]) for of in made) for name in listed if made}
+    for step, of in enumerate(made, 1):
         for name in listed:
-            bar = max(beyond, model.opt.tolerance) if name in SOLVED else beyond
-            share, worst = 1.0, 0
-            if mine[name].shape == others[name].shape:
-                # what is small beside its own terms, or beside what the field has at other steps, is rounding
-                terms = size(mine["qacc_smooth"]) if name == "qacc" else 0.0
-                scale = max(size(mine[name]), terms, PASSING * peaks[name]) or 1.0
-                shares = np.nan_to_num(np.abs(mine[name] - others[name]) / scale, nan=np.inf).ravel()
-                worst = int(shares.argmax()) if shares.size else 0
-                share = float(shares.max(initial=0.0))
-            largest[name], over = max(largest.get(name, 0.0), share), max(over, share / bar)
-            if first is None and share > bar:
+            scale = max(size(of.mine[name]), PASSING * peaks[name]) or 1.0
+            allowed = max(beyond, model.opt.tolerance) if name in SOLVED else beyond
+            rounding = size(of.distance(name, of.moved)) / scale
+            if rounding == np.inf:  # a contact is there or not, by rounding
+                continue
+            distances = of.distance(name, of.others)
+            share, worst = size(distances) / scale, int(distances.argmax()) if distances.size else 0
+            largest[name] = max(largest.get(name, 0.0), share)
+            over = max(over, share / max(allowed, FACTOR * rounding))
+            if first is None and share > max(allowed, FACTOR * rounding):
                 owners = names.get(name, [""])
-                first = Difference(step, name, owners[worst * len(owners) // max(mine[name].size, 1)], share)
+                first = Difference(step, name, owners[worst * len(owners) // max(distances.size, 1)], share)
     return first, largest, over
 
 
