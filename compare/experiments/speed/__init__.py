@@ -114,19 +114,15 @@ def compilation(rows: Sequence[RunRow]) -> dict[str, float]:
 
 def add_absent(result: SpeedResult, setup: Setup) -> None:
     """Rows and findings: engines that do not run, or not with all methods."""
-    groups: dict[tuple[str, str], list[str]] = {}
     for (engine, method), reason in left_out(setup.engines, setup.size, setup.robot).items():
-        groups.setdefault((engine, reason), []).append(method)
+        about: dict[str, Any] = {"engine": engine, "method": method, "unit": result.unit, "why_not": reason}
+        result.rows += [RunRow(scene=scene, **about) for scene in result.floors]
+    groups: dict[tuple[str, str], dict[str, None]] = {}
+    for row in result.rows:
+        if row.why_not:
+            groups.setdefault((row.engine, row.why_not), {})[row.method] = None
     for (engine, reason), names in groups.items():
-        for scene in result.floors:
-            method = ", ".join(names)
-            result.rows.append(
-                RunRow(scene=scene, engine=engine, method=method, unit=result.unit, why_not=reason)
-            )
-    for row in [row for row in result.rows if row.why_not and row.scheme]:
-        groups.setdefault((row.engine, row.why_not or ""), []).append(row.method)
-    for (engine, reason), names in groups.items():
-        methods = [] if len(names) == len(setup.engines[engine].methods) else names
+        methods = [] if len(names) == len(setup.engines[engine].methods) else [*names]
         result.find("absent", engine=LABELS.get(engine, engine), methods=methods, reason=reason)
 
 

@@ -20,6 +20,9 @@ CLEAR_EPS = 100.0  # the same of an engine in another precision, its eps, and an
 NEAR_ROUNDING = 30  # a smaller multiple of the error of rounding counts as rounding
 TARGETS = (1e-3, 1e-6, 1e-9)  # rad or m, worst error of a run
 TARGET = 1e-6  # rad or m: the error for which the first screen has the cheapest settings
+OF_RUN = (  # fields of a UseRow that are those of a RunRow
+    "method", "dt", "tolerance", "steps", "extrapolated", "evaluations", "worst_error", "energy_error",
+)  # fmt: skip
 NOT_SOLVED = 1.0  # rad or m: a run with a larger error is none
 
 
@@ -159,11 +162,10 @@ def use_of(
     """The row of an engine's cheapest run; None: there is none. least: s, of all engines."""
     use = UseRow(scene=scene, target=target, engine=engine, unit=rows[0].unit)
     if row:
+        for name in OF_RUN:
+            setattr(use, name, getattr(row, name))
         twin = same_scheme(rows, row)
-        use.method, use.dt, use.tolerance = row.method, row.dt, row.tolerance
-        use.steps, use.evaluations, use.ms = row.steps, row.evaluations, 1e3 * row.time
-        use.extrapolated, use.over_cheapest = row.extrapolated, row.time / least
-        use.worst_error, use.energy_error = row.worst_error, row.energy_error
+        use.ms, use.over_cheapest = 1e3 * row.time, row.time / least
         use.over_same_scheme = row.time / twin.time if twin else None
     return use
 

@@ -103,17 +103,8 @@ def rows_of(scene: SceneRuns, engines: Mapping[str, Engine], size: str, compiled
     case, every = scene.case, methods(engines, size, scene.case)
     some = [method for method in every if (method.engine in IN_QUICK_RUNS) == compiled]
     settings = {method: settings_of(method, case, size) for method in some}
-    if compiled:
-        rows = measure(case, engines, settings, scene.reference)
-    else:
-        seconds = max((budget(method, case.robot, size).seconds for method in some), default=0.0)
-        rows = measure(case, engines, settings, scene.reference, seconds)
-    for row in rows:
-        if scene.reference.why and row.worst_error is not None:  # a smaller error is not known
-            least = scene.floor
-            row.error, row.worst_error = max(row.error or 0.0, least), max(row.worst_error, least)
-            row.early_error = max(row.early_error or 0.0, least)
-    return rows
+    longest = max((budget(method, case.robot, size).seconds for method in some), default=0.0)
+    return measure(case, engines, settings, scene.reference, math.inf if compiled else longest)
 
 
 def measure(
@@ -165,7 +156,7 @@ def measured(
         outcome = run()
         seconds = time.perf_counter() - begin
         motion = read(outcome)
-        errors = reference.error(motion.q)
+        errors = np.maximum(reference.error(motion.q), reference.apart if reference.why else 0.0)
         is_near = errors.max() <= NEAR  # then it has the energy of the reference, about
         at = None if is_near else diverged_at(case, reference.t, motion.q, motion.v)
     row = row_of(case, method, tolerance=setting.tolerance, evaluations=motion.evaluations)

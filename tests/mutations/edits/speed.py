@@ -18,7 +18,7 @@ EDITS = (
     ("conclusions", "cheapest", "all(_1)", "True", "the cheapest of all is that of each engine", 1),
     ("conclusions", "use_of", "row.time / twin.time", "twin.time / row.time", "the cost of generality is inverted"),
     ("conclusions", "use_of", "row.time / least", "least / row.time", "ratios of engines are inverted"),
-    ("conclusions", "use_of", "row.energy_error", "row.error", "the error of positions is that of the energy"),
+    ("conclusions", "OF_RUN", '"energy_error"', '"unit"', "the cheapest settings have no error of the energy"),
     ("speed.runs", "RunRow.extrapolated", "self.timed_steps != self.steps", "False", "nothing says what is extrapolated"),
     ("speed.runs", "measure", "_1.time > budget", "False", "runs of a slow engine have no end"),
     ("speed.runs", "measure", "isinstance(error, TooLong)", "False", "an engine without an answer is asked again"),
