@@ -327,6 +327,14 @@ def test_a_slip_that_explains_a_part_alone_is_not_named(word, brought):
     assert word not in message_of(**brought(h, 9.0 * np.random.default_rng(4).normal(size=len(h))), **states)
 
 
+@pytest.mark.parametrize("values, is_single", [
+    (np.full((20, 2, 2), 0.5) + np.eye(2), False),
+    (np.float32(np.random.default_rng(1).normal(size=(20, 1, 1)) + np.eye(2)), True),
+])  # fmt: skip
+def test_numbers_have_single_precision_where_they_need_all_of_it(values, is_single):
+    assert ("float32" in message_of(mass_matrix=values, q=table()[0]["q"])) is is_single
+
+
 @pytest.mark.parametrize("more, is_rounded", [(0.0, True), (0.05, False)])
 def test_a_table_whose_states_are_rounded_too(more, is_rounded):
     (states, h) = table()

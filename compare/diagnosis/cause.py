@@ -33,6 +33,7 @@ class Diagnosis(NamedTuple):
     parts: tuple[str, ...] = ()  # that differ: "M", "h", or its "velocity terms" and "gravity"
     known: tuple[str, ...] = ()  # parts that are compared
     is_symmetric: bool = True  # the given M
+    is_large: bool = True  # beyond what rounded constants change
     is_of_forces: bool = False  # of accelerations, of which the forces are given
     too_few: int = 0  # states, if they are too few for a search
     seconds: float | None = None  # of a search that was not finished

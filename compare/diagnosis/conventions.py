@@ -239,6 +239,15 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
             ]  # fmt: skip
             if causes:
                 yield Convention(together(causes, 0.0), own_q, own_qd, S, drift)
+        for explains, factor in {
+            "twice as large, q' = q omega for q omega / 2": 2.0,
+            "half as large": 0.5,
+        }.items():
+            S = np.tile(np.eye(equations.nv), (len(q), 1, 1))
+            S[:, joint.qd, joint.qd] *= factor
+            place = f"angular velocity of {name}"
+            cause = Cause(rank=1, kind="axes", place=place, stated="", explains=explains)
+            yield Convention(cause, q, np.einsum("sij,sj->si", S, qd), S, 0.0 * qd)
 
 
 def orders_of_speeds(equations: Equations) -> Iterator[Convention]:

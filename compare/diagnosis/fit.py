@@ -25,6 +25,7 @@ PROMISING = 1e-4  # of the difference: places that leave more, to second order, 
 NEARLY = 5e-13  # of the difference: what an explanation may leave as rounding
 NEAR_ZERO = 1e-6  # of the size of a number
 NEAR_PAIRS, THIRDS = 8, 4  # pairs beside which a third number is sought, and how many of these
+PAIRS = 20_000  # that are looked at together
 CANDIDATES = 64  # pairs that are fitted, the most promising of all
 NUMBERS = 1_000_000  # in one evaluation, about, of changes: each has nv^2 at each state
 TURNED = np.pi * np.array([-0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # more starts for the zero of a hinge
@@ -278,12 +279,20 @@ class Search:
         pairs = np.array([pair for pair in combinations(active, 2) if not first.isdisjoint(pair)])
         if not len(pairs):
             return []
-        spans = np.concatenate([pairs, pairs + count], axis=1)  # of the first and second coefficients of both
-        matrices = inner[spans[:, :, None], spans[:, None, :]] + 1e-9 * np.eye(4)
-        coefficients = np.linalg.solve(matrices, down[spans][:, :, None])[:, :, 0]
-        best = np.argsort(-np.einsum("pi,pi->p", coefficients, down[spans]))[:CANDIDATES]
-        near = coefficients[best][:, :2] / lengths[pairs[best]] * self.sizes[pairs[best]]
-        return self.outcome(np.tile(pairs[best], (2, 1)), np.concatenate([near, np.zeros_like(near)]))
+        near: list[tuple[float, tuple[int, int], ndarray]] = []
+        for start in range(0, len(pairs), PAIRS):
+            self.in_time()
+            block = pairs[start : start + PAIRS]
+            spans = np.concatenate([block, block + count], axis=1)  # of first and second coefficients of both
+            matrices = inner[spans[:, :, None], spans[:, None, :]] + 1e-9 * np.eye(4)
+            coefficients = np.linalg.solve(matrices, down[spans][:, :, None])[:, :, 0]
+            explained = np.einsum("pi,pi->p", coefficients, down[spans])
+            best = np.argsort(-explained)[:CANDIDATES]
+            changes = coefficients[best][:, :2] / lengths[block[best]] * self.sizes[block[best]]
+            near += zip(explained[best].tolist(), map(tuple, block[best].tolist()), changes)
+        near = sorted(near, key=lambda pair: -pair[0])[:CANDIDATES]
+        numbers, starts = np.array([pair for _, pair, _ in near]), np.array([x for *_, x in near])
+        return self.outcome(np.tile(numbers, (2, 1)), np.concatenate([starts, np.zeros_like(starts)]))
 
 
 def nearest_change(a: ndarray, b: ndarray, off: ndarray) -> tuple[float, float]:

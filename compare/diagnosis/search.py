@@ -32,6 +32,7 @@ from .variants import lagrange, program_options
 
 FEW = 2  # states at which conventions are tried first
 TRIED = 3  # states at which other explanations are tried first
+LARGE = 7e7  # times the tolerance of 64 eps: 1e-6 of the scale
 NEAREST = 0.05  # of the difference: what leaves more is not near
 NEAR = 2  # conventions with which another cause is sought
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
@@ -97,6 +98,7 @@ class Explanations:
             True, entries=tuple(name for name, at in zip(names, places) if self.off[at].any()),
             compared=sum(known[at].any() for at in places), parts=self.named(self.differing),
             known=self.named(self.known), is_symmetric=layout.is_symmetric, is_of_forces=layout.qdd is not None,
+            is_large=bool(np.nanmax(np.abs(self.search.off)) > LARGE),
         )  # fmt: skip
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
