@@ -5,7 +5,7 @@ these are named where they do. Remarks tell a user of them, and of what is fixed
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -17,10 +17,10 @@ from ...core.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
-from .locked import FROM_GEOMS, compiled
+from .locked import compiled
 from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
-from .source import Source, is_urdf
+from .source import Source, is_from_geoms, is_urdf
 
 # of the equations of motion
 STATED_FLAGS = {"flag gravity": "GRAVITY", "flag damper": "DAMPER", "flag eulerdamp": "EULERDAMP"}
@@ -95,37 +95,37 @@ class Stated(NamedTuple):
     tolerance: float = 0.0  # the largest difference that is rounding
 
 
-# options of the compiler that change numbers: when they are in force, and what switches them off
-OPTIONS: dict[str, tuple[Callable[[Any], bool], Any]] = {
-    "settotalmass": (lambda mass: mass > 0.0, -1.0),
-    "inertiafromgeom": (
-        lambda kind: int(kind) == FROM_GEOMS,
-        int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO),
-    ),
-    "alignfree": (bool, False),
-    "boundmass": (lambda mass: mass > 0.0, 0.0),
-    "boundinertia": (lambda moment: moment > 0.0, 0.0),
-    "balanceinertia": (bool, False),
-}
-OF_JOINTS = "springdamper"  # with it the compiler chooses damping and stiffness of a joint
+# what switches each option of the compiler off that changes numbers
+OFF_VALUES: dict[str, float] = {
+    "settotalmass": -1.0, "inertiafromgeom": int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_AUTO),
+    "boundmass": 0.0, "boundinertia": 0.0, "balanceinertia": False,
+}  # fmt: skip
 FROM_INERTIAL = ("mass", "com", "inertia")
 
 
-def switched_off(spec: mujoco.MjSpec, name: str) -> bool:
-    """Whether an option was in force somewhere in a spec, where it is off now."""
-    if name == OF_JOINTS:
-        chosen = [joint for joint in spec.joints if np.any(joint.springdamper)]
-        for joint in chosen:
-            joint.springdamper = np.zeros(2)
-        return bool(chosen)
-    is_on, value = OPTIONS[name]
-    found = name == "alignfree" and any(map(aligns, spec.joints))
-    for joint in spec.joints if found else ():
-        joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
-    for compiler in (spec.compiler, *(body.compiler for body in spec.bodies)):
-        found |= name != "alignfree" and is_on(getattr(compiler, name))
-        setattr(compiler, name, value)
-    return bool(found)
+def in_force(spec: mujoco.MjSpec) -> list[str]:
+    """The options of a file that may change numbers; with springdamper the compiler chooses two of a joint."""
+    compilers = [spec.compiler, *(body.compiler for body in spec.bodies)]
+    is_on = {name: any(float(getattr(each, name)) > 0.0 for each in compilers) for name in OFF_VALUES}
+    is_on["inertiafromgeom"] = is_from_geoms(spec)
+    is_on["alignfree"] = any(map(aligns, spec.joints))
+    is_on["springdamper"] = any(bool(np.any(joint.springdamper)) for joint in spec.joints)
+    return [name for name, is_it in is_on.items() if is_it]
+
+
+def without_options(source: Source, names: Sequence[str]) -> mujoco.MjSpec:
+    """The spec of a file, without meshes that have no mass, with some options off."""
+    spec = source.bare.copy()
+    for name in names:
+        for compiler in (spec.compiler, *(body.compiler for body in spec.bodies)):
+            if name in OFF_VALUES:
+                setattr(compiler, name, OFF_VALUES[name])
+        for joint in spec.joints:
+            if name == "springdamper":
+                joint.springdamper = np.zeros(2)
+            elif name == "alignfree":
+                joint.align = mujoco.mjtAlignFree.mjALIGNFREE_FALSE
+    return spec
 
 
 def compiled_numbers(spec: mujoco.MjSpec) -> dict[tuple[str, str], np.ndarray]:
@@ -168,10 +168,9 @@ def stated_numbers(source: Source) -> list[Stated]:
     """
     if source.spec is None:
         return []
-    names = (*OPTIONS, OF_JOINTS)
-    spec = source.bare.copy()
-    in_force, traces = [name for name in names if switched_off(spec, name)], dict[tuple[str, str], float]()
-    for body, number in zip(spec.bodies, source.bodies) if "balanceinertia" in in_force else ():
+    options = in_force(source.spec)
+    spec, traces = without_options(source, options), dict[tuple[str, str], float]()
+    for body, number in zip(spec.bodies, source.bodies) if "balanceinertia" in options else ():
         moments = body.fullinertia[:3] if np.isfinite(body.fullinertia[0]) else body.inertia
         if body.explicitinertial:
             traces[element_name(source.model, "body", number), "inertia"] = trace = float(np.sum(moments))
@@ -179,12 +178,10 @@ def stated_numbers(source: Source) -> list[Stated]:
     stated = compiled_numbers(spec)
     for key, trace in traces.items():
         stated[key] -= trace * np.eye(3)
-    others: dict[str, dict[tuple[str, str], np.ndarray] | None] = dict.fromkeys(in_force)
-    for name in in_force:
+    others: dict[str, dict[tuple[str, str], np.ndarray] | None] = dict.fromkeys(options)
+    for name in options:
         with suppress(ValueError):  # of a tensor
-            spec = source.bare.copy()
-            switched_off(spec, name)
-            others[name] = compiled_numbers(spec)
+            others[name] = compiled_numbers(without_options(source, [name]))
     left = left_to_compiler(source)
     rows = []
     for key, number in numbers_of(source.model).items():
@@ -249,7 +246,8 @@ def of_source(source: Source) -> list[Finding]:
         values = {"link": element_name(model, "body", fixed[0]), "mass": float(model.body_mass[fixed].sum())}
         findings.append(Finding("remarks", "fixed_base", values))
     changed: dict[str, dict[str, list[str]]] = {}
-    for number in stated_numbers(source):
+    has_options = source.spec is not None and bool(in_force(source.spec))
+    for number in stated_numbers(source) if has_options else ():
         if number.why and number.stated is not None:
             changed.setdefault(number.why, {}).setdefault(number.quantity, []).append(number.place)
     for why, places in changed.items():
