@@ -45,7 +45,16 @@ def locked(out: Path) -> Iterator[None]:
             advice = "use another folder (--out), or wait until it has ended"
             raise Refused(f"another fleet is writing to {out}; {advice}")
         interrupt.on_interrupt(RESUME)
+        interrupt.at_end.callback(clear_up, out / FILES)
         yield
+
+
+def clear_up(files: Path) -> None:
+    """Delete what calls that were killed have left of reports."""
+    for work in sorted(files.rglob(".new-*")):
+        folder.clear_away(work.parent)
+        with suppress(OSError):  # there is an earlier report
+            work.parent.rmdir()
 
 
 def saved(place: Path, key: str) -> object:

@@ -10,7 +10,6 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 
 from ..core.text import block
-from ..report.folder import clear_away
 from .cache import program, save, saved
 from .executors import Executor, Outcome
 from .models import Model, place_of_report
@@ -83,12 +82,10 @@ class Run:
     def receive(self, answer: Answer) -> None:
         """A file is done: save its row beside its report."""
         (model, key), (row, why) = self.under_way.pop(answer), self.executor.outcome(answer)
-        place = self.out / place_of_report(model.shown)
         if row is None:
             row = FileRow(file=model.shown, verdict=BROKE, reason=why)
-            clear_away(place)
         else:
-            save(place, key, asdict(row))
+            save(self.out / place_of_report(model.shown), key, asdict(row))
         self.rows.append(row)
 
     def progress(self) -> list[str]:

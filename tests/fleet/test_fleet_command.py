@@ -135,6 +135,7 @@ def test_the_key_ctrl_c(temporary, tmp_path):
     lines = [line for line in runs.readable_lines(run) if line]
     assert run.status == 2 and "interrupted" in lines[-1] and "of 4 files, " in run.output
     assert soon(lambda: not is_left_at_work(temporary) and not list(temporary.iterdir()))
+    assert not list((tmp_path / "out").rglob(".new-*"))
 
 
 @pytest.mark.slow
