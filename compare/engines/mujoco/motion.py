@@ -206,15 +206,23 @@ class Roll(NamedTuple):
     controls: Array | None = None
 
 
-@dataclass(frozen=True)
+@dataclass
 class Scene:
-    """Motions of a whole model by its own step and integrator. points: sites whose places count too."""
+    """Motions of a whole model by its own step and integrator.
+
+    points: sites whose places count too. small: what is left of the model, None: all.
+    """
 
     tree: tmt.Tree
     whole: "Smaller"
     stepper: Stepper
     rolls: Sequence[Roll]
     points: tuple[str, ...] = ()
+    small: "Smaller | None" = None
+
+    @property
+    def left(self) -> "Smaller":
+        return self.small or self.whole
 
     @property
     def name(self) -> str:

@@ -69,7 +69,7 @@ def add_scenes(result: Result, setup: Setup) -> None:
         result.find("driven", scenes=driven)
     for case in setup.robot.cases_of_torque:
         scene = scene_of_case(case, source)
-        locks = lockable(scene, scene.whole, ERROR)
+        locks = lockable(scene, ERROR)
         needed = tuple(row.joint for row in locks.rows if row.why_needed)
         stays = tuple(row.joint for row in locks.rows if not row.why_needed)
         groups.setdefault((needed, case.scene.locked, stays), []).append(case.name)
@@ -103,8 +103,8 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
             result.top.append(result.finding("unstable", about=about, verdict=verdict, limit=limit))
             result.not_judged(motion.name, QUANTITY, UNSTABLE, about=About.STEP)
             return
-    free, small = take_out(scene)
-    locks = lockable(scene, small, allowed)
+    free = take_out(scene)
+    locks = lockable(scene, allowed)
     made = {
         "source": str(reading.source),
         "scene": scene.name,
@@ -115,7 +115,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
         while True:  # until an error that six digits make is allowed, too
             names, model, _ = locks.models[-1]
             comment = block(TEXT, "comment", about=made, names=names, command=setup.command)
-            error = scene.error(written(scene, model, draft, comment), from_keys=True)
+            error = scene.error(written(scene, names, draft, comment), from_keys=True)
             if error <= allowed or not names:
                 break
             locks.models.pop()
@@ -148,9 +148,8 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
 
 def timed_models(scene: Scene, locks: Locks, elements: int) -> list[ModelRow]:
     """The models on the way, and the time of a step of each; elements: how many never act."""
-    _, free, _ = locks.models[0]
     models = [("the file", scene.whole, 0.0, list[str]())]
-    models += [(f"without what never acts ({elements})", free, 0.0, [])] if elements else []
+    models += [(f"without what never acts ({elements})", scene.left, 0.0, [])] if elements else []
     models += [(f"and {names[-1]} locked", model, error, names) for names, model, error in locks.models[1:]]
     calls = {number: scene.timed(small) for number, (_, small, *_) in enumerate(models)}
     seconds = fastest(calls, ROUNDS, time.thread_time)  # other programs may wait for the processor, too
@@ -163,9 +162,9 @@ def timed_models(scene: Scene, locks: Locks, elements: int) -> list[ModelRow]:
 
 def add_checks(result: Result, scene: Scene, locks: Locks, error: float, allowed: float) -> None:
     """A smaller model is within the error, what is taken out changes no bit, and locks are those of tmt."""
-    (_, free, _), (names, model, _) = locks.models[0], locks.models[-1]
+    names, model, _ = locks.models[-1]
     unit, note = movement_unit(coordinates_of(scene)), f"locked: {', '.join(names)}"
-    changed = scene.error(Smaller(free.spec.copy()))
+    changed = scene.error(Smaller(scene.left.spec.copy()))
     result.check(scene.name, "motion without what never acts", changed, 0.0, unit, rule="equal")
     result.check(
         scene.name, "motion of the smaller model", error, allowed, unit, note, about=About.PREDICTION

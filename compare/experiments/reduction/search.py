@@ -19,11 +19,11 @@ DOES_TURN = 0.1  # rad, of all others
 SAMPLES = 25  # states of a motion
 
 
-def take_out(scene: Scene) -> tuple[list[FreeRow], Smaller]:
-    """Take out one kind after the other if the motion is the same to the last bit: rows, and what is left."""
-    small, rows = scene.whole, list[FreeRow]()
+def take_out(scene: Scene) -> list[FreeRow]:
+    """Take one kind after the other out of what is left of a scene, if the motion is the same to the last bit."""
+    rows = list[FreeRow]()
     for kind, edit in FREE.items():
-        trial = Smaller(small.spec.copy())
+        trial = Smaller(scene.left.spec.copy())
         try:
             count = edit(trial, scene.use)
             trial = Smaller(trial.spec)
@@ -31,9 +31,9 @@ def take_out(scene: Scene) -> tuple[list[FreeRow], Smaller]:
             continue
         if count:
             is_same = same_bits(scene.run(trial), scene.paths)
-            small = trial if is_same else small
+            scene.small = trial if is_same else scene.left
             rows.append(FreeRow(kind, count, is_same))
-    return rows, small
+    return rows
 
 
 def same_bits(paths: Sequence[Path], others: Sequence[Path]) -> bool:
@@ -49,20 +49,20 @@ class Locks(NamedTuple):
     models: list[tuple[list[str], Smaller, float]]  # with the first of them, and the error, rad or m
 
 
-def lockable(scene: Scene, small: Smaller, allowed: float) -> Locks:
-    """Lock joints of a model, those of least error first, until an error, rad or m, of those that stay.
+def lockable(scene: Scene, allowed: float) -> Locks:
+    """Lock joints of what is left, those of least error first, until an error, rad or m, of those that stay.
 
     Those that a tendon or an equality ties are locked together, each at the middle of its movement. One that moves
     more than DOES is not locked, nor is a free base.
     """
-    use, model, costs = scene.use, small.model, dict[tuple[str, ...], float]()
+    use, model, costs = scene.use, scene.left.model, dict[tuple[str, ...], float]()
     kinds = {name: kind_of(model, number) for number, name in enumerate(joints(model))}
     for tied in tied_joints(model):
-        costs[tuple(tied)] = error_of(scene, small, tied)[1]
-    chosen, models = list[str](), [(list[str](), small, 0.0)]
+        costs[tuple(tied)] = error_of(scene, tied)[1]
+    chosen, models = list[str](), [(list[str](), scene.left, 0.0)]
     for group in sorted(costs, key=lambda group: costs[group]):
         if all(use.moved[name] <= DOES.get(kinds[name], DOES_TURN) for name in group):
-            trial, error = error_of(scene, small, [*chosen, *group])
+            trial, error = error_of(scene, [*chosen, *group])
             if trial and error <= allowed:
                 chosen += group
                 models.append((list(chosen), trial, error))
@@ -80,10 +80,10 @@ def lockable(scene: Scene, small: Smaller, allowed: float) -> Locks:
     return Locks(rows, chosen, models)
 
 
-def error_of(scene: Scene, small: Smaller, names: Sequence[str]) -> tuple[Smaller | None, float]:
-    """A model with joints locked and its error, rad or m; inf: something else refers to one, or none moves then."""
+def error_of(scene: Scene, names: Sequence[str]) -> tuple[Smaller | None, float]:
+    """What is left with joints locked and its error, rad or m; inf: something refers to one, or none moves then."""
     try:
-        trial = locked(small, {name: scene.use.middle[name] for name in names})
+        trial = locked(scene.left, {name: scene.use.middle[name] for name in names})
     except ValueError:
         return None, np.inf
     return trial, scene.error(trial) if trial.model.nv else np.inf
@@ -110,7 +110,8 @@ def starts(scene: Scene) -> dict[str, tuple[float, ...]]:
     return {name: tuple(row) for name, row in zip(of_joints, largest.tolist())}
 
 
-def written(scene: Scene, small: Smaller, path: File, comment: str) -> Smaller:
-    """Write a model with the starts of the scene's motions as its keyframes; what is read again."""
+def written(scene: Scene, names: Sequence[str], path: File, comment: str) -> Smaller:
+    """Write what is left with joints locked, with the starts of the motions as keyframes; what is read again."""
+    small = locked(scene.left, {name: scene.use.middle[name] for name in names})
     finished(small, scene.starts(small)).write(path, comment)
     return Smaller.whole(Source(path))

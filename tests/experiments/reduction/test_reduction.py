@@ -14,7 +14,7 @@ from compare.robots.arm import ARM
 
 def stays(case) -> set[str]:
     scene = scene_of_case(case, Source(ARM.mjcf))
-    return {row.joint for row in lockable(scene, scene.whole, 1e-3).rows if not row.why_needed}
+    return {row.joint for row in lockable(scene, 1e-3).rows if not row.why_needed}
 
 
 KNOWN = {"bent, held": {*ARM.joints}, "ball catch, held": {*ARM.joints}, "zero, free": {"beta"}}

@@ -105,7 +105,7 @@ def two_arms(tmp_path_factory):
 
 def test_what_a_motion_does_not_use_goes_bit_for_bit():
     arms = scene(TWO_ARMS, controls=waves("left upper"))
-    rows, small = take_out(arms)
+    rows, small = take_out(arms), arms.left
     assert {row.kind: row.taken_out for row in rows if row.same_bits} == {
         "drawing": 3, "sensors": 1, "geoms that never touch": 6, "equalities without force": 1, "actuators without force": 3,
         "tendons without force": 1, "limits that never act": 2, "stages without work": 3,
@@ -121,9 +121,9 @@ def test_a_kind_without_which_the_motion_differs_stays(monkeypatch):
         return 1
 
     monkeypatch.setattr(search, "FREE", {"mass": heavier} | FREE)
-    rows, small = take_out(scene(TWO_ARMS, controls=waves("left upper")))
-    assert [row.kind for row in rows if not row.same_bits] == ["mass"]
-    assert small.model.body("left hand").mass == pytest.approx(0.3, rel=1e-12)
+    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    assert [row.kind for row in take_out(arms) if not row.same_bits] == ["mass"]
+    assert arms.left.model.body("left hand").mass == pytest.approx(0.3, rel=1e-12)
 
 
 def test_the_idle_arm_is_locked_and_the_written_file_does_the_same_motion(two_arms):
@@ -260,6 +260,7 @@ def test_a_file_beyond_the_error_fails_and_a_model_that_moves_otherwise():
     for small, error, passed in ((arms.whole, 0.99e-3, (True, True)), (arms.whole, 1.01e-3, (True, False)),
                                  (heavier, 0.0, (False, True))):  # fmt: skip
         result, locks = Result("reduction"), search.Locks([], [], [([], small, 0.0)])
+        arms.small = small
         reduction.add_checks(result, arms, locks, error, 1e-3)
         assert tuple(check.passed for check in result.checks) == passed
 
@@ -267,7 +268,7 @@ def test_a_file_beyond_the_error_fails_and_a_model_that_moves_otherwise():
 def test_the_joints_that_a_tendon_ties_are_locked_together():
     """A hand whose thumb is still; the tendon and its servo go with it. The index moves far, at no cost to others."""
     hand = scene(HAND, controls=waves("index"))
-    locks = lockable(hand, hand.whole, 1e-2)
+    locks = lockable(hand, 1e-2)
     assert {"thumb", "thumb tip"} <= set(locks.names) and "index" not in locks.names
     assert [len(names) for names, *_ in locks.models] == sorted({len(names) for names, *_ in locks.models})
     thumb = {row.joint: row.error_if_locked for row in locks.rows}
@@ -280,7 +281,7 @@ def test_the_joints_that_a_tendon_ties_are_locked_together():
 def test_joints_are_locked_from_the_least_error_on_and_one_that_costs_too_much_is_passed_over(monkeypatch):
     costs = {"wrist": 1e-4, "index": 2e-4, "thumb": 3e-4, "thumb tip": 4e-4}
 
-    def error_of(scene, small, names):
+    def error_of(scene, names):
         alone = max(costs[name] for name in names)
         return SimpleNamespace(names=names), 1.0 if len(names) > 1 and "index" in names else alone
 
@@ -288,8 +289,8 @@ def test_joints_are_locked_from_the_least_error_on_and_one_that_costs_too_much_i
     monkeypatch.setattr(search, "tied_joints", lambda model: [[name] for name in reversed(costs)])
     monkeypatch.setattr(search, "DOES_TURN", 10.0)
     hand = scene(HAND, controls=waves("index"))
-    assert lockable(hand, hand.whole, 4e-4).names == ["wrist", "thumb", "thumb tip"]
-    locks = lockable(hand, hand.whole, 3.99e-4)
+    assert lockable(hand, 4e-4).names == ["wrist", "thumb", "thumb tip"]
+    locks = lockable(hand, 3.99e-4)
     assert locks.names == ["wrist", "thumb"]
     assert [row.joint for row in locks.rows if row.why_needed] == ["index", "thumb tip"]
 
@@ -303,7 +304,7 @@ REASONS = """<mujoco><worldbody><body><joint name="alpha" axis="0 0 1"/><geom si
 
 
 def test_why_a_joint_is_needed():
-    locks = lockable(scene(REASONS), scene(REASONS).whole, 1e-3)
+    locks = lockable(scene(REASONS), 1e-3)
     rows = {row.joint: row for row in locks.rows}
     assert rows["alpha"].why_needed == "alpha has a speed at the start"
     assert "at the start" in rows["beta"].why_needed and rows["still"].locked and not rows["still"].why_needed

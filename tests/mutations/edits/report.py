@@ -78,7 +78,7 @@ EDITS = (
     ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),
     # of a file's motion
-    ("reduction.search", "take_out", "trial if is_same else small", "trial", "what changes the motion is taken out"),
+    ("reduction.search", "take_out", "trial if is_same else scene.left", "trial", "what changes the motion is taken out"),
     ("reduction.search", "same_bits", "bits[0] == bits[1]", "True", "every motion is the same"),
     ("mujoco.motion", "Repeated.__init__", "here.qfrc_applied[v] = _1", "pass", "forces that act all the time are lost"),
     ("mujoco.motion", "apart", "np.isfinite(error)", "True", "a run that fails has no error"),
