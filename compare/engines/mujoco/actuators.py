@@ -122,6 +122,25 @@ def clipped(m: mujoco.MjModel, u: np.ndarray) -> np.ndarray:
     return u
 
 
+def ranges_of(m: mujoco.MjModel, inputs: str) -> np.ndarray:
+    """The least and the largest activations and inputs, (2, na + nu) of ctrl, (2, na + nv) of qfrc_applied.
+
+    Infinite where they have no range.
+    """
+    low = np.full(m.na + (m.nu if inputs == "ctrl" else m.nv), -np.inf)
+    limits = np.array([low, -low])
+    for i in range(number_of_actuators(m)):
+        last = m.actuator_actadr[i] + m.actuator_actnum[i] - 1
+        if m.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_MUSCLE:
+            limits[:, last] = 0.0, 1.0
+        elif m.actuator_actlimited[i]:
+            limits[:, last] = m.actuator_actrange[i]
+    if inputs == "ctrl" and on(m, "CLAMPCTRL"):
+        is_limited = np.flatnonzero(m.actuator_ctrllimited)
+        limits[:, m.na + is_limited] = m.actuator_ctrlrange[is_limited].T
+    return limits
+
+
 class Actuators:
     """The actuators of a compiled model, a Drive; positions q (nq,) and moments in the order of the file.
 

@@ -53,7 +53,7 @@ class Source:
     origin: the Path or the text; None: compiled elsewhere. floating: whether the base of a URDF gets a free
     joint. text: what it says. model: without what is only drawn. missing: the files of meshes and height
     fields that cannot be read: geoms of them are left out. warnings: of MuJoCo's compiler, one line each.
-    bodies, joints: their numbers in the model, in the order of the spec. ModelError, in one line, where
+    bodies: their numbers in the model, in the order of the spec. ModelError, in one line, where
     MuJoCo makes no model of it.
     """
 
@@ -100,7 +100,7 @@ class Source:
             if not np.isclose(moving_mass(compiled(fused)), moving_mass(self.model)):
                 raise ModelError(f"cannot compare {self}: {LOST}")
         # elements have their numbers in the model only once compiled
-        self.bodies, self.joints = [body.id for body in spec.bodies], [joint.id for joint in spec.joints]
+        self.bodies = [body.id for body in spec.bodies]
 
     def problem(self, error: str) -> str:
         """Why MuJoCo makes no model of it, and what to do."""

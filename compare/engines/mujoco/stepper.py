@@ -8,8 +8,8 @@ import numpy as np
 from mujoco.rollout import rollout
 from numpy.typing import ArrayLike
 
-from .actuators import held_at
-from .names import INTEGRATORS, SETTLING, bit, control_of, element_name, number_of_actuators
+from .actuators import held_at, ranges_of
+from .names import INTEGRATORS, SETTLING, bit, control_of, element_name
 
 Array = np.ndarray
 Act = Callable[[int, mujoco.MjData], None]  # before a step: its number, and the data to read and change
@@ -25,7 +25,7 @@ INPUTS = ("ctrl", "qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "moc
 REMEMBERED = sum(int(member) for name, member in PARTS.items() if name in ("history", "plastic"))
 BAD = [int(getattr(mujoco.mjtWarning, f"mjWARN_BADQ{what}")) for what in ("POS", "VEL", "ACC")]
 SLEEP = int(getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0))
-INTEGRATING, MUSCLE = mujoco.mjtDyn.mjDYN_INTEGRATOR, mujoco.mjtDyn.mjDYN_MUSCLE
+INTEGRATING = mujoco.mjtDyn.mjDYN_INTEGRATOR
 
 # a warning would append MUJOCO_LOG.TXT to the current directory; divergence is detected here instead
 _log = mujoco.MjLogConfig.get()
@@ -230,7 +230,7 @@ class Stepper:
         m, n = self.model, 2 * self.model.nv + self.model.na
         values = np.concatenate([np.zeros(2 * m.nv), state[self.places["act"]], state[self.places[by]]])
         endless = np.tile([[-np.inf], [np.inf]], 2 * m.nv)
-        low, high = np.hstack([endless, ranges_of_activations(m), ranges_of(m, by)])
+        low, high = np.hstack([endless, ranges_of(m, by)])
         ahead, behind = eps * (values + eps <= high), eps * (values - eps >= low)
         behind[ahead > 0.0] *= centred
         both, first = np.zeros((n, len(values))), 0
@@ -280,29 +280,6 @@ class Stepper:
         return np.concatenate([movement, other[v] - one[v], other[act] - one[act]])
 
 
-def ranges_of_activations(m: mujoco.MjModel) -> Array:
-    """The least and the largest value of each activation, (2, na); infinite where it has no range."""
-    limits = np.tile([[-np.inf], [np.inf]], m.na)
-    for actuator in range(number_of_actuators(m)):
-        place = m.actuator_actadr[actuator] + m.actuator_actnum[actuator] - 1
-        if m.actuator_dyntype[actuator] == MUSCLE:
-            limits[:, place] = 0.0, 1.0
-        elif m.actuator_actlimited[actuator]:
-            limits[:, place] = m.actuator_actrange[actuator]
-    return limits
-
-
-def ranges_of(m: mujoco.MjModel, inputs: str) -> Array:
-    """The least and the largest value of each control, (2, nu), or of each force, (2, nv), infinite."""
-    if inputs != "ctrl":
-        return np.tile([[-np.inf], [np.inf]], m.nv)
-    limits = np.tile([[-np.inf], [np.inf]], m.nu)
-    if not m.opt.disableflags & bit("CLAMPCTRL"):
-        is_limited = m.actuator_ctrllimited.astype(bool)
-        limits[:, is_limited] = m.actuator_ctrlrange[is_limited].T
-    return limits
-
-
 def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
     """The movement from positions to others, (..., nq) each: (..., nv) rad or m, of a ball in its own axes."""
     pairs = np.broadcast_arrays(q0, q1)
@@ -311,14 +288,3 @@ def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
     for row, start, end in zip(moved, starts, ends):
         mujoco.mj_differentiatePos(m, row, 1.0, start, end)
     return moved.reshape(*pairs[0].shape[:-1], m.nv)
-
-
-def touching(stepper: Stepper, state: Array, by: Array) -> set[str]:
-    """The pairs of geoms whose contacts have forces at a moved state, and how many contacts each has."""
-    m, d = stepper.model, stepper.put(state)
-    mujoco.mj_integratePos(m, d.qpos, by[: m.nv], 1.0)
-    d.qvel += by[m.nv : 2 * m.nv]
-    mujoco.mj_forward(m, d)
-    pairs = [tuple(pair) for pair in d.contact.geom[d.contact.efc_address >= 0].tolist()]
-    names = [" and ".join(element_name(m, "geom", geom) for geom in pair) for pair in pairs]
-    return {f"{name} ({pairs.count(pair)})" for pair, name in zip(pairs, names)}
