@@ -18,21 +18,24 @@ WAYS = "", "", ", with the right accelerations"  # how it is said
 def slips_of_kinematics(equations: Equations) -> Iterator[Hypothesis]:
     """The values with each slip of one body, and with those that all bodies can have, in each of the ways."""
     kinematics, names = Kinematics(equations), equations.tree.body_names
-    total: dict[tuple[str, str, str], list[ndarray]] = {}  # by the place, its owner, and what it explains
-    owners: dict[tuple[str, str, str], int] = {}
+    total: dict[
+        tuple[str, int | None, str], list[ndarray]
+    ] = {}  # by the place, its body (None: all), what it is
+    bodies: dict[tuple[str, int | None, str], int] = {}
     slips = list(all_slips(kinematics))
     for start in range(0, len(slips), BLOCK):
         block = slips[start : start + BLOCK]
         for item, added in zip(block, kinematics.effects(block)):
-            for owner in (names[item.body], EVERY_BODY) if item.of_body else ("",):
-                key = item.place, owner, item.explains
+            for body in (item.body, None) if item.of_body else (None,):
+                key = item.place, body, item.explains
                 total[key] = [a + b for a, b in zip(total[key], added)] if key in total else added
-                owners[key] = owners.get(key, 0) + 1
-    for (place, owner, explains), ways in total.items():
-        size, said = max(np.abs(way).max() for way in ways), list[ndarray]()
-        count = owners[place, owner, explains]
-        if owner == EVERY_BODY and count < 2:
+                bodies[key] = bodies.get(key, 0) + 1
+    for (place, body, explains), ways in total.items():
+        count, of_bodies = bodies[place, body, explains], "{}" in place
+        if of_bodies and body is None and count < 2:
             continue
+        owner = (EVERY_BODY if body is None else names[body]) if of_bodies else ""
+        size, said = max(np.abs(way).max() for way in ways), list[ndarray]()
         for values, how in zip(ways, WAYS[-len(ways) :]):
             if size > 0.0 and all(np.abs(values - other).max() > SAME * size for other in said):
                 said.append(values)
