@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tmt import Tree
-from tmt.methods import lone_speeds
+from tmt.methods import isolated_speeds
 
 from . import Array, Course, EngineRecord
 from .outside import as_it_runs
@@ -27,7 +27,11 @@ METHODS = OF_MJX | {"implicit": (1, "implicit"), "discrete": (1, "semi_implicit_
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
     """METHODS for a Tree: as MuJoCo since 4.0, implicitfast and discrete are implicit in the bias of a free body on its own, and
     discrete in springs."""
-    lone = {"implicitfast": (1, "implicitfast"), "discrete": (1, "implicitfast")} if lone_speeds(tree) else {}
+    lone = (
+        {"implicitfast": (1, "implicitfast"), "discrete": (1, "implicitfast")}
+        if isolated_speeds(tree)
+        else {}
+    )
     return METHODS | lone | ({"discrete": (1, "discrete")} if tree.has_springs else {})
 
 

@@ -47,7 +47,7 @@ def compiled(traced):
     """The traced function of some numbers, as a function in Python."""
     code = Code("f", {"in": POINTER, "out": POINTER})
     code.call(traced.name, code["in"], code["out"])
-    code.give_back()
+    code.ret()
     library = Library(module([*functions(traced, 1), code]))
     function = library.function("f", None, ctypes.c_void_p, ctypes.c_void_p)
 

@@ -57,7 +57,7 @@ class Entries:
             for k in code.each(size):
                 state.store(code[array].load(k), k + before)
         code.call("quantity", state, out)
-        code.give_back(self.wrong(code, state, out).choose(code.number(1, INDEX), 0))
+        code.ret(self.wrong(code, state, out).choose(code.number(1, INDEX), 0))
         return code
 
     def rows(self) -> Code:
@@ -80,5 +80,5 @@ class Entries:
             for k in code.each(self.results):
                 for lane, row in enumerate(rows):
                     code["out"].store(out.load(k * width + lane), row * self.results + k)
-        code.give_back(wrong.get())
+        code.ret(wrong.get())
         return code

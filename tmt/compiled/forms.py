@@ -16,7 +16,7 @@ from tmt.derivation.method import reduced_force
 from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
 from tmt.derivation.vectors import Rows, Scalar, Values, minus, plus
 from tmt.methods import Linearized, method_named, one_step
-from tmt.methods.stepping import Dynamics, Held, Method
+from tmt.methods.stepping import Dynamics, Implicit, Method
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
@@ -47,13 +47,15 @@ class Traceable(Dynamics):
         self.n, self.by_bodies = len(tree.axis), by_bodies
         super().__init__(form._replace(rates=linearized.rates if self.n > DENSE else None))
 
-    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
-        if not self.by_bodies or (held and not held.acts_at_single_joints):
-            return super().acceleration(tree, q, qd, tau, held)
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
+    ) -> Values:
+        if not self.by_bodies or (implicit and not implicit.acts_at_single_joints):
+            return super().acceleration(tree, q, qd, tau, implicit)
         force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
-        if held:
-            force = minus(force, held.pull)
-            armature = plus(armature, [row[i] for i, row in enumerate(held.matrix)])
+        if implicit:
+            force = minus(force, implicit.force)
+            armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
         return articulated.acceleration(tree, q, qd, force, armature)
 
     def solve_any(self, matrix: Rows, right: Values) -> Values:

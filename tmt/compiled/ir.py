@@ -221,7 +221,7 @@ class Code:
         yield
         self.begin(done)
 
-    def give_back(self, value: Value | None = None) -> None:
+    def ret(self, value: Value | None = None) -> None:
         self.lines.append(f"  ret {value.kind} {value.name}" if value else "  ret void")
 
     @property

@@ -33,7 +33,7 @@ def solve() -> Code:
             j = inner.index + i + 1
             right.store(right.load(i) - matrix.load(i * stride + j) * right.load(j), i)
         right.store(right.load(i) / matrix.load(i * stride + i), i)
-    code.give_back()
+    code.ret()
     return code
 
 
@@ -46,7 +46,7 @@ def solution(n: int) -> Code:
         code["out"].store(code["in"].load(loop.index + n * n), loop.index)
     size = code.number(n, INDEX)
     code.call("solve", matrix, size, code["out"], size)
-    code.give_back()
+    code.ret()
     return code
 
 

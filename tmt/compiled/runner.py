@@ -110,9 +110,9 @@ def address(array: Array) -> int:
 def runner_of(tree: Tree, name: str) -> Runner:
     """The Runner of a tree and the method of that name as it is now; ValueError if they are none."""
     checked_model(tree)
-    return held(tree, method_named(name))
+    return cached_runner(tree, method_named(name))
 
 
 @lru_cache(maxsize=64)
-def held(tree: Tree, stepping: Method) -> Runner:
+def cached_runner(tree: Tree, stepping: Method) -> Runner:
     return Runner(tree, stepping)

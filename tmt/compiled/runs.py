@@ -280,7 +280,7 @@ def run(step: Step, advance: Advance) -> Code:
             for k, variable in ((2, step.wanted), (3, step.left)):
                 code["carried"].store(variable.get(), runs.index * 4 + k)
         runs.leave(is_stopped(code))
-    code.give_back()
+    code.ret()
     return code
 
 

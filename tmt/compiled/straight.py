@@ -80,7 +80,7 @@ def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
         steps.write(code, steps.order, width, {})
         return [code]
     sections = [steps.order[k : k + LONGEST] for k in range(0, len(steps.order), LONGEST)]
-    places, size = steps.handed_on(sections)
+    places, size = steps.live_out(sections)
     main, result = entry(traced.name, "noinline"), []
     handed = main.reserve(wide(DOUBLE, width), size)
     for k, section in enumerate(sections):
@@ -88,7 +88,7 @@ def functions(traced: Traced, width: int, inline: bool = False) -> list[Code]:
         steps.write(part, section, width, places)
         main.call(part.name, main["in"], main["out"], handed)
         result.append(part)
-    main.give_back()
+    main.ret()
     return [*result, main]
 
 
@@ -96,7 +96,7 @@ def entry(name: str, attributes: str, *more: str) -> Code:
     return Code(name, dict.fromkeys(("in", "out", *more), POINTER), attributes=attributes)
 
 
-def places_handed_on(made: list[list[Key]], last: Mapping[Key, int]) -> tuple[dict[Key, int], int]:
+def live_out_places(made: list[list[Key]], last: Mapping[Key, int]) -> tuple[dict[Key, int], int]:
     """The place of each value that a part hands to later ones, free after the last; how many places."""
     leaving: list[list[int]] = [[] for _ in made]
     free: list[int] = []
@@ -129,14 +129,14 @@ class Steps:
             arguments = *(a for a in arguments if a != product), *self.tape.operands(product)
         return [a for a in arguments if self.tape.nodes[a][0] != "number"]
 
-    def handed_on(self, sections: list[list[int]]) -> tuple[dict[int, int], int]:
+    def live_out(self, sections: list[list[int]]) -> tuple[dict[int, int], int]:
         made: list[list[int]] = [[] for _ in sections]  # by each part
         last: dict[int, int] = {}  # the part that takes a value last
         for k, section in enumerate(sections):
             for i in section:
                 made[k] += self.items.get(i, [i])
                 last |= {a: k for a in self.takes(i) if a not in self.input}
-        return places_handed_on(made, last)
+        return live_out_places(made, last)
 
     def write(self, code: Code, order: list[int], width: int, places: dict[int, int]) -> None:
         """The lines of some of the steps; places: of the nodes that parts of a function hand on."""
@@ -166,7 +166,7 @@ class Steps:
             for i in [i for i in self.outputs if tape.nodes[i][0] in LEAVES]:
                 for k in self.outputs[i]:
                     out.store(value(i), k * width)
-        code.give_back()
+        code.ret()
 
     def results(self, code: Code, i: int, value: Callable[[int], Value], width: int) -> dict[int, Value]:
         nodes = self.tape.nodes

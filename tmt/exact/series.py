@@ -56,7 +56,7 @@ def sincos_of_pair() -> Code:
     code = Code("sincos", {"out": POINTER, "high": DOUBLE, "low": DOUBLE}, attributes="noinline")
     for k, x in enumerate(sincos(code["high"], code["low"])):
         code["out"].store(x, k)
-    code.give_back()
+    code.ret()
     return code
 
 
@@ -141,7 +141,7 @@ def expansion() -> Code:
             slope, other = r - sine.choose(width, width * 2), sine.choose(r + width, r - width)
             h, l = convolution(code, slope, other + k, code.number(1, INDEX), k)
             put(*divide(h, l, sine.choose(times, -times), code.number(0.0)))
-    code.give_back()
+    code.ret()
     return code
 
 
@@ -169,5 +169,5 @@ def evaluation() -> Code:
             l.set(total[1])
         code["state"].store(h.get(), numbers.index)
         code["state"].store(l.get(), numbers.index + code["n"])
-    code.give_back()
+    code.ret()
     return code

@@ -4,7 +4,7 @@ import math
 import re
 from collections.abc import Sequence
 
-from tmt.compiled.straight import places_handed_on
+from tmt.compiled.straight import live_out_places
 
 from .statements import Function, Line, Program, Syntax, statements
 
@@ -70,7 +70,7 @@ def definitions(program: Program, function: Function) -> list[str]:
     if len(lines) <= LONGEST:
         return [f"{declared(program, function)}\n{block(arrays, [line.text for line in lines])}"]
     sections = [lines[k : k + LONGEST] for k in range(0, len(lines), LONGEST)]
-    texts, size = handed_on(sections)
+    texts, size = live_out(sections)
     handed, name = f"{number} w[{size}]", f"{program.name}_{function.name}"
     parts = [f"{name}_{k}" for k in range(1, 1 + len(sections))]
     heads = [f"static void {part}({arguments(program, function)}, {handed})" for part in parts]
@@ -85,10 +85,10 @@ def block(arrays: Sequence[str], lines: Sequence[str]) -> str:
     return "\n".join(["{", *(f"    {line}" for line in (*unused, *lines)), "}"])
 
 
-def handed_on(sections: Sequence[Sequence[Line]]) -> tuple[list[list[str]], int]:
+def live_out(sections: Sequence[Sequence[Line]]) -> tuple[list[list[str]], int]:
     """The lines of each part of a function, with w[place] for a value of an earlier one; the size of w."""
     last = {name: k for k, lines in enumerate(sections) for line in lines for name in NAME.findall(line.text)}
-    places, size = places_handed_on([[line.name for line in lines if line.name] for lines in sections], last)
+    places, size = live_out_places([[line.name for line in lines if line.name] for lines in sections], last)
     earlier: dict[str, str] = {}
     texts = []
     for lines in sections:

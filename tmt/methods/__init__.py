@@ -16,7 +16,7 @@ from tmt.methods.derivatives import transition as transition
 from tmt.methods.implicit import ImplicitRungeKutta
 from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
-from tmt.methods.semi_implicit import lone_speeds as lone_speeds
+from tmt.methods.semi_implicit import isolated_speeds as isolated_speeds
 from tmt.methods.stepping import Method, Numbers, Slope, State, Tableau, advance, increments
 from tmt.model.values import shown
 
@@ -97,8 +97,8 @@ METHODS: dict[str, Method] = {
     "explicit_euler": RungeKutta(order=1, A=((),), b=(1.0,), c=(0.0,)),
     "semi_implicit_euler": SemiImplicitEuler(implicit_bias=False),
     "implicit": SemiImplicitEuler(implicit_bias=True, implicit_gains=True),
-    "implicitfast": SemiImplicitEuler(implicit_bias=False, lone_bodies=True, implicit_gains=True),
-    "discrete": SemiImplicitEuler(False, lone_bodies=True, implicit_springs=True, implicit_gains=True),
+    "implicitfast": SemiImplicitEuler(implicit_bias=False, isolated_bodies=True, implicit_gains=True),
+    "discrete": SemiImplicitEuler(False, isolated_bodies=True, implicit_springs=True, implicit_gains=True),
     "implicit_midpoint": ImplicitRungeKutta(order=2, A=((0.5,),), b=(1.0,), c=(0.5,)),
     "gauss_legendre_4": ImplicitRungeKutta(  # Hairer, Norsett, Wanner, Solving ODEs I, II.7
         order=4,

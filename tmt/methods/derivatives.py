@@ -26,7 +26,7 @@ from tmt.derivation.vectors import (
     solve_any,
     total,
 )
-from tmt.methods.stepping import LITERAL, Dynamics, Held, Implicit, Method
+from tmt.methods.stepping import LITERAL, Dynamics, Implicit, Method
 from tmt.methods.stepping import State as Reached
 
 Array = np.ndarray
@@ -52,9 +52,11 @@ class Linearized(Dynamics):
         # dual numbers of traced scalars meet the same states once for each direction; i: of a scalar on the tape
         self.changes: dict[tuple[int, ...], Change] = {}
 
-    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
+    ) -> Values:
         plain_q, plain_qd, plain_tau = (values_of(part) for part in (q, qd, tau))
-        plain = held._replace(pull=values_of(held.pull)) if held else None
+        plain = implicit._replace(force=values_of(implicit.force)) if implicit else None
         key = tuple(getattr(x, "i", -1) for x in (*plain_q, *plain_qd, *plain_tau))
         if -1 in key or key not in self.changes:
             self.changes[key] = self.change(tree, plain_q, plain_qd, plain_tau, plain)
@@ -65,11 +67,11 @@ class Linearized(Dynamics):
         dq, dqd, right = ([dual.parts(x)[1] for x in part] for part in (q, qd, tau))
         moved = tree.coordinates.tangent(plain_q, dq)
         right = minus(right, plus(times(change.by_movement, moved), times(change.by_speed, dqd)))
-        if held:
-            right = minus(right, [dual.parts(x)[1] for x in held.pull])
+        if implicit:
+            right = minus(right, [dual.parts(x)[1] for x in implicit.force])
         return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
 
-    def change(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Held) -> Change:
+    def change(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None) -> Change:
         a = super().acceleration(tree, q, qd, tau, implicit)
         state = State(tree, {"q": q, "qd": qd, "qdd": a}, self.form)
         matrix, (by_movement, by_speed) = state.mass_matrix, state.torque_rates

@@ -22,7 +22,7 @@ class SemiImplicitEuler(Method):
 
         (Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 (k + P)]) a = Qbar [- dt (k + P) qd].
 
-    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `lone_bodies`,
+    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `isolated_bodies`,
     which have no other body on them or under them; `implicit_gains`: so is a controller's S, in the entries
     whose two joints lie on one path to the world; `implicit_springs`: so are springs, and all entries of S
     and P. What MuJoCo calls Euler (none of these), implicit (bias, gains), implicitfast (lone bodies, gains)
@@ -31,11 +31,11 @@ class SemiImplicitEuler(Method):
     """
 
     implicit_bias: bool
-    lone_bodies: bool = False
+    isolated_bodies: bool = False
     implicit_springs: bool = False
     implicit_gains: bool = False
 
-    def gains_held(self, tree: AnyTree) -> tuple[Gains, Gains]:
+    def entries_of_gains(self, tree: AnyTree) -> tuple[Gains, Gains]:
         """The implicit entries of the gains of position and of speed, (nv, nv) each; () for none."""
         if self.implicit_springs:
             return (tree.position_gain, tree.speed_gain)
@@ -44,19 +44,19 @@ class SemiImplicitEuler(Method):
         connected = zip(tree.speed_gain, on_one_path(tree))
         return (), tuple([gain if is_on else 0.0 for gain, is_on in zip(*rows)] for rows in connected)
 
-    def held(self, tree: AnyTree) -> tuple[Gains, Gains]:
+    def stiffness_and_damping(self, tree: AnyTree) -> tuple[Gains, Gains]:
         n = len(tree.axis)
         has_stiffness = self.implicit_springs and tree.has_springs
         stiffness = by_speed(tree, tree.stiffness) if has_stiffness else [0.0] * n
-        position_gain, speed_gain = self.gains_held(tree)
+        position_gain, speed_gain = self.entries_of_gains(tree)
         return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
     def implicit(self, tree: AnyTree, qd: Values, dt: Scalar) -> Implicit:
-        (stiff, damped), powers, moved = self.held(tree), (dt, dt * dt), [dt * v for v in qd]
+        (stiff, damped), powers, moved = self.stiffness_and_damping(tree), (dt, dt * dt), [dt * v for v in qd]
         matrix = [[weighted(entry, powers) for entry in zip(*rows)] for rows in zip(damped, stiff)]
-        pull = [weighted(row, moved) for row in stiff]
-        alone = lone_speeds(tree) if self.lone_bodies else frozenset()
-        return Implicit(matrix, pull, dt, frozenset(range(len(qd))) if self.implicit_bias else alone)
+        force = [weighted(row, moved) for row in stiff]
+        alone = isolated_speeds(tree) if self.isolated_bodies else frozenset()
+        return Implicit(matrix, force, dt, frozenset(range(len(qd))) if self.implicit_bias else alone)
 
     def slope(
         self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
@@ -83,7 +83,7 @@ def on_one_path(tree: AnyTree) -> list[list[bool]]:
 
 
 @lru_cache(maxsize=64)
-def lone_speeds(tree: AnyTree) -> frozenset[int]:
+def isolated_speeds(tree: AnyTree) -> frozenset[int]:
     """The speeds of free bodies (three slides and a ball from the world) that carry nothing."""
     lone: set[int] = set()
     for i in range(3, len(tree.kind)):

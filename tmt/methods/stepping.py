@@ -27,10 +27,10 @@ MOST_EVALUATIONS = 100_000_000  # of the dynamics, in a run of an adaptive metho
 
 
 class Implicit(NamedTuple):
-    """What a method takes at the end of its step: (Mbar + matrix [+ dt dh/dqd in rows]) a = Qbar - pull."""
+    """What a method takes at the end of its step: (Mbar + matrix [+ dt dh/dqd in rows]) a = Qbar - force."""
 
     matrix: Rows  # (nv, nv)
-    pull: Values  # (nv,), N m
+    force: Values  # (nv,), N m
     dt: Scalar  # s
     bias_rows: frozenset[int]  # speeds of whose bias it takes the change
 
@@ -40,27 +40,26 @@ class Implicit(NamedTuple):
         return not self.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
 
 
-Held = Implicit | None
-
-
 class Dynamics:
     """Accelerations from Mbar and h, as a Form has their sums."""
 
     def __init__(self, form: Form = quantities.LITERAL):
         self.form = form
 
-    def acceleration(self, tree: AnyTree, q: Values, qd: Values, tau: Values, held: Held = None) -> Values:
+    def acceleration(
+        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
+    ) -> Values:
         """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
         M, h = self.form.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
-        if held is None:
+        if implicit is None:
             return solve(M, force)
-        matrix = added(M, held.matrix)
-        if held.bias_rows:
+        matrix = added(M, implicit.matrix)
+        if implicit.bias_rows:
             rates = self.bias_rates(tree, q, qd)
-            for i in held.bias_rows:
-                matrix[i] = plus(matrix[i], [held.dt * rate for rate in rates[i]])
-        return self.solve_any(matrix, minus(force, held.pull))
+            for i in implicit.bias_rows:
+                matrix[i] = plus(matrix[i], [implicit.dt * rate for rate in rates[i]])
+        return self.solve_any(matrix, minus(force, implicit.force))
 
     def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
         if self.form.rates is None:

@@ -7,7 +7,7 @@ from typing import Any
 import mujoco
 
 from tmt import Tree
-from tmt.methods import lone_speeds
+from tmt.methods import isolated_speeds
 
 from ...robots.case import Case
 from .. import Engine, Method
@@ -32,7 +32,7 @@ def methods_for(tree: Tree | None = None) -> dict[str, Method]:
     """
     schemes, order = dict(SCHEMES), 4
     if tree is not None:
-        lone = bool(lone_speeds(tree))
+        lone = bool(isolated_speeds(tree))
         if lone or tree.has_gains:
             schemes["implicitfast"] = schemes["discrete"] = "implicitfast"
         if tree.has_springs or tree.has_gains:

@@ -17,7 +17,7 @@ from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
 from tmt.compiled import store
 from tmt.compiled.machine import Library
-from tmt.compiled.runner import held as compiled_runs
+from tmt.compiled.runner import cached_runner as compiled_runs
 from tmt.methods import METHODS, SemiImplicitEuler, semi_implicit
 
 STEPS = {"one step", "open loop"}
@@ -39,8 +39,8 @@ def failing(case, engines, *integrators) -> set:
 
 @dataclasses.dataclass(frozen=True)
 class ExplicitDamping(SemiImplicitEuler):
-    def held(self, tree):
-        return SemiImplicitEuler.held(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)))
+    def stiffness_and_damping(self, tree):
+        return SemiImplicitEuler.stiffness_and_damping(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)))
 
 
 HASTY = METHODS["rk4"].b + 1e6 * EPS * np.array([1.0, 0.0, 0.0, -1.0])
