@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from trees import one_body, random_state, small_tree, wrist
 
 import tmt
+from tmt import simulation
 from tmt.compiled import runner
 from tmt.exact.motion import trajectory
 
@@ -126,6 +127,11 @@ def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
         assert not tree.never_singular and max(sizes) <= 1025 * 64 * 3 and len(few.q) == 3
         assert np.array_equal(few.q, whole.q[::3000]) and np.array_equal(few.qd, whole.qd[::3000])
         assert few.ended == whole.ended and few.evaluations == whole.evaluations
+        monkeypatch.setattr(simulation, "STEPS", 7)
+        short = tmt.simulate(q, qd, Z, 0.02, 30, method, tree)
+        monkeypatch.setattr(simulation, "STEPS", 1024)
+        whole = tmt.simulate(q, qd, Z, 0.02, 30, method, tree)
+        assert np.array_equal(short.q, whole.q) and short.evaluations == whole.evaluations
     starts = np.array([[0.5, 0.0, 1.0], *np.tile(q, (70, 1)), [0.5, 0.0, 1.0]])
     many = tmt.simulate(starts, qd, Z, 1e-3, 2100, "rk4", tree, every=7)
     one = tmt.simulate(q, qd, Z, 1e-3, 2100, "rk4", tree, every=7)
@@ -135,6 +141,10 @@ def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
         and one.ended is None
     )
     assert np.array_equal(many.q[70], one.q) and np.isnan(many.q[71, 1:]).all()
+    monkeypatch.setattr(simulation, "STEPS", 1)  # the time of an end is that from the start
+    assert tmt.simulate(q, [1.0, 0.0, 0.0], [1e3] * 3, 0.01, 40, "rk4", tree).ended.startswith(
+        "at t = 0.02 s"
+    )
 
 
 def test_a_motion_of_one_unit_takes_the_steps_that_its_error_wants():

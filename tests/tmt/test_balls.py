@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from itertools import product as product_of
 
 import mujoco
 import numpy as np
@@ -16,7 +17,9 @@ from tmt.derivation.coordinates import product
 from tmt.exact.many import exact_of_many
 from tmt.exact.motion import trajectory
 
-K, REST, AXIS = 2.5, np.array([0.5, 0.5, -0.5, 0.5]), np.array([1.0, 2.0, -2.0]) / 3.0
+K, REST = 2.5, np.array([0.5, 0.5, -0.5, 0.5])
+# of the second w is exactly zero after half a turn, of the first but for rounding
+AXES = np.array([1.0, 2.0, -2.0]) / 3.0, np.array([0.0, -1.0, 0.0])
 TREE = one_body(np.eye(3), ["ball"], stiffness=[K], rest=REST, gravity=(0.0, 0.0, 0.0))
 FILE = f"""<mujoco><option gravity="0 0 0"/><worldbody><body><joint type="ball" stiffness="{K}"/>
 <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
@@ -25,16 +28,16 @@ QUANTITIES = "spring_torque", "potential_energy", "inverse_dynamics_derivatives"
 Z = np.zeros(3)
 
 
-def turned(angle):
-    """The position after a turn about AXIS from rest; of half a turn w is exactly zero there."""
+def turned(angle, axis=AXES[0]):
+    """The position after a turn about an axis from rest."""
     sine, cosine = np.sin(angle / 2.0), np.cos(angle / 2.0)
-    return np.array(product(REST.tolist(), [0.0 if angle == np.pi else cosine, *(sine * AXIS)]))
+    return np.array(product(REST.tolist(), [0.0 if angle == np.pi else cosine, *(sine * axis)]))
 
 
-def expected(angle):
+def expected(angle, axis):
     """Torque, energy and the derivative of the torque: k u, k u^2 / 2 and k dexp^-1(u), |u| at most pi."""
     angle = angle if angle <= np.pi else angle - 2.0 * np.pi
-    u, half = angle * AXIS, angle / 2.0
+    u, half = angle * axis, angle / 2.0
     cross = np.array([np.cross(u, unit) for unit in np.eye(3)]).T
     share = (1.0 - half / np.tan(half)) / angle**2 if abs(angle) > 1e-4 else 1.0 / 12.0
     return K * u, K * angle**2 / 2.0, K * (np.eye(3) + cross / 2.0 + share * cross @ cross)
@@ -84,9 +87,10 @@ def test_a_spring_at_any_turn_has_its_torque_energy_and_derivatives(kind, tmp_pa
     if kind == "JAX":
         pytest.importorskip("jax").config.update("jax_enable_x64", True)
     values = TYPES[kind](tmp_path)
-    for angle in TURNS:
-        torque, energy, by_movement = expected(angle)
-        states = [turned(angle)], [turned(angle)], [turned(angle), Z, Z]
+    for angle, axis in product_of(TURNS, AXES):
+        torque, energy, by_movement = expected(angle, axis)
+        q = turned(angle, axis)
+        states = [q], [q], [q, Z, Z]
         calls = zip(QUANTITIES, states)
         found = [np.array(values(name, *state), dtype=float) for name, state in calls]
         assert np.abs(found[0] - torque).max() <= 1e-14
@@ -98,9 +102,10 @@ def test_a_spring_at_any_turn_has_its_torque_energy_and_derivatives(kind, tmp_pa
 def test_a_spring_at_any_turn_is_that_of_mujoco(angle):
     model = mujoco.MjModel.from_xml_string(FILE)
     model.qpos_spring[:], data = REST, mujoco.MjData(model)
-    data.qpos = turned(angle)
-    mujoco.mj_forward(model, data)
-    assert np.abs(tmt.spring_torque(data.qpos, TREE) + data.qfrc_spring).max() <= 1e-14
+    for axis in AXES:
+        data.qpos = turned(angle, axis)
+        mujoco.mj_forward(model, data)
+        assert np.abs(tmt.spring_torque(data.qpos, TREE) + data.qfrc_spring).max() <= 1e-14
 
 
 def test_a_quaternion_of_nearly_length_1_has_the_turn_of_one_of_length_1():

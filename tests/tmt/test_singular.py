@@ -86,3 +86,20 @@ def test_a_slide_that_takes_its_mass_to_the_axis_of_a_hinge_is_singular_there_al
             assert np.allclose(qdd, expected, rtol=1e-9)
     motion = tmt.simulate([0.2, 0.0], [0.0, 0.0], [0.0, 0.0], 0.01, 5, model=tree)
     assert motion.ended.startswith("at t = 0 s") and "hinge 'a' turns" in motion.ended
+
+
+def test_slides_that_a_hinge_between_them_makes_parallel_are_singular_there():
+    tree = one_body([X, np.eye(3)[2], Y], ["slide", "hinge", "slide"])
+    assert not tree.never_singular and np.isfinite(tmt.acceleration(Z, Z, Z, tree)).all()
+    with pytest.raises(ValueError, match="slides 'a', 'c' move together without moving any mass"):
+        tmt.acceleration([0.0, np.pi / 2.0, 0.0], Z, Z, tree)
+
+
+@pytest.mark.parametrize("mass, is_known", [(0.9e-6, False), (1.1e-6, True)])
+def test_a_body_holds_slides_if_its_mass_is_a_share_of_all_that_they_carry(mass, is_known):
+    """A millionth: of less it is not known whether Mbar is regular, as rounding may hide it."""
+    tree = tmt.Tree(
+        ["a", "b", "c"], (-1, 0, 0), np.zeros((3, 3)), (X, Y, Y), Z, ["light", "heavy"], (1, 2), (mass, 1.0 - mass),
+        np.zeros((2, 3)), [np.eye(3)] * 2, (0.0, 0.0, -9.81), ["slide"] * 3,
+    )  # fmt: skip
+    assert tree.never_singular is is_known

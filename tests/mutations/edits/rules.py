@@ -35,9 +35,9 @@ EDITS = (
     ("export.checks", "Row.passed", "(self.of_mujoco or 0.0) <= 1.0", "True", "exported equations are not compared with MuJoCo"),
     ("export.checks", "Row.passed", "self.of_exact <= 1.0", "True", "exported equations have no exact values"),
     ("export.checks", "Outcome.passed", "all(_1)", "any(_1)", "one quantity that agrees is enough"),
-    ("export.checks", "Judge.largest", "self.factor * np.asarray(scale)", "2.0 * _0", "tolerance x 2"),
-    ("export.checks", "Judge.__init__", "FACTOR * eps", "FACTOR * 1.2e-07", "doubles have the tolerance of floats"),
-    ("export.checks", "Judge.rows", "zip(labels, values, *_1)", "zip(labels[:1], values)", "one part of several is judged"),
+    ("export.checks", "rows_of", "factor * np.asarray(scale)", "2.0 * _0", "tolerance x 2"),
+    ("export.checks", "checked", "float(np.finfo(kind).eps)", "1.2e-07", "doubles have the tolerance of floats"),
+    ("export.checks", "rows_of", "enumerate(labels)", "enumerate(labels[:1])", "one part of several is judged"),
     ("export.checks", "worst_of", "share_of(_1, _2)[at]", "0.5", "what is no number agrees"),
     # scales
     ("judge.scale", "levers", "links[..., i]", "100.0 * links[..., i]", "levers x 100", 2),
