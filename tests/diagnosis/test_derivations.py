@@ -1,4 +1,4 @@
-"""Slips in a derivation by Lagrange's equations, made in SymPy: a pan and a tilt with an arm, nothing along an axis of another."""
+"""Slips in a derivation by Lagrange's equations, made in SymPy: a pan and a tilt with an arm that is along no axis."""
 
 import numpy as np
 import pytest
