@@ -100,7 +100,7 @@ def test_ctrl_c_interrupts_a_run(q, dt, steps, more, monkeypatch):
     monkeypatch.setattr(runner, "MOST_EVALUATIONS", 10**12)
     tmt.simulate(q, Z, Z, 1e-3, 2, **more | {"every": 1})  # is compiled
     main = threading.main_thread().ident
-    timer = threading.Timer(0.3, signal.pthread_kill, (main, signal.SIGINT))
+    timer = threading.Timer(0.1, signal.pthread_kill, (main, signal.SIGINT))
     begun = time.perf_counter()
     timer.start()
     with pytest.raises(KeyboardInterrupt):

@@ -115,8 +115,18 @@ def test_rates_in_closed_form_are_those_of_dual_numbers_in_the_literal_form(seed
             assert np.abs(values - right).max() <= 1e-12 * np.abs(right).max() and np.abs(right).max() > 0.1
 
 
-@pytest.mark.parametrize("make", [small_tree, beside])
-@pytest.mark.parametrize("method", tmt.METHODS)
+LONE = (
+    "rk4",
+    "semi_implicit_euler",
+    "implicit",
+    "implicitfast",
+    "discrete",
+)  # which take other terms of a free body
+
+
+@pytest.mark.parametrize("method, make", [
+    *((method, small_tree) for method in tmt.METHODS), *((method, beside) for method in LONE),
+])  # fmt: skip
 def test_a_and_b_are_the_limits_of_differences_of_a_step(method, make, rng):
     tree, dt = make(), 0.05
     (q,), (qd,), (tau,) = random_states(rng, tree, 1)
