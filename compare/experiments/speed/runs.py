@@ -13,7 +13,7 @@ from tmt.methods import METHODS
 from ...core import timing
 from ...core.check import Result
 from ...core.rows import MOVEMENT, MovementRow, column
-from ...engines import GRID, IN_QUICK_RUNS, Dynamics, Engine, Method, Setting
+from ...engines import GRID, IN_QUICK_RUNS, RECORDS, Dynamics, Engine, Method, Setting
 from ...engines.outside.file import EngineError, TooLong
 from ...judge.rounding import growth
 from ...judge.run import diverged_at, movement_unit
@@ -118,21 +118,29 @@ def measure(
     """
     rows: list[RunRow] = []
     silent: dict[str, str] = {}  # engines, and why
-    nq = case.coordinates.nq
-    energy = tmt.energy(reference.high[:, :nq], reference.high[:, nq:], case.tree)
+    paths: list[np.ndarray] = []  # of the rows that reach the end
     for method, of_method in settings.items():
         for setting in of_method:
             try:
+                begin = time.process_time()
                 if method.engine in silent:
                     raise EngineError(silent[method.engine])
-                rows.append(measured(case, engines[method.engine], method, setting, reference, energy))
+                row, path = measured(case, engines[method.engine], method, setting, reference)
+                rows.append(row)
+                paths += [] if row.ended else [path]
             except EngineError as error:
                 if isinstance(error, TooLong):
                     silent[method.engine] = str(error)
                 rows.append(row_of(case, method, why_not=str(error).rstrip(".")))
                 break
-            if rows[-1].time > budget:
+            # of this process, which another one may interrupt, its own time
+            spent = row.time if RECORDS[method.engine].reads_file else time.process_time() - begin
+            if spent > budget:
                 break
+    states, nq = np.array([*paths, reference.high]), case.coordinates.nq
+    energy = tmt.energy(states[..., :nq], states[..., nq:], case.tree)
+    for row, off in zip([row for row in rows if row.worst_error is not None], np.abs(energy - energy[-1])):
+        row.energy_error = float(off.max())
     return rows
 
 
@@ -144,9 +152,9 @@ def row_of(case: Case, method: Method, **values: object) -> RunRow:
 
 
 def measured(
-    case: Case, engine: Engine, method: Method, setting: Setting, reference: Reference, energy: np.ndarray
-) -> RunRow:
-    """The row of one run: errors of positions and of the energy, J, at 65 equal times, and its time."""
+    case: Case, engine: Engine, method: Method, setting: Setting, reference: Reference
+) -> tuple[RunRow, np.ndarray]:
+    """The row of one run, with its time and the errors of positions at 65 equal times; and its states there."""
     dynamics = engine.of(case)
     with np.errstate(all="ignore"):  # in a run that diverges
         begin = time.perf_counter()
@@ -166,11 +174,10 @@ def measured(
     row.compile_seconds = getattr(dynamics, "seconds_prepared", None) or prepared
     if at is not None:
         row.ended = str(motion.ended or f"diverged at {at:.2g} s")
-        return row
+        return row, motion.states
     row.error, row.worst_error = float(errors[-1]), float(errors.max())
     row.early_error = float(errors[reference.t <= EARLY].max())
-    row.energy_error = float(np.abs(tmt.energy(motion.q, motion.v, case.tree) - energy).max())
-    return row
+    return row, motion.states
 
 
 def floor(case: Case, dynamics: Dynamics) -> float:
