@@ -10,7 +10,7 @@ import pytest
 from in_process import InProcess, without_workers
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure
-from sections import row_of
+from sections import GOOD, row_of, section
 
 from compare.__main__ import main
 from compare.cli import command_line
@@ -19,6 +19,7 @@ from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
 from compare.experiments.setup import Request
 from compare.process import interrupt
+from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 from compare.run import command
@@ -180,3 +181,12 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
     for section_of_name, name in zip(sections, names):
         assert [figure.file for figure in section_of_name.figures] == [f"{name}_{k}" for k in range(3)]
+
+
+def test_an_experiment_under_way_is_not_finished_although_it_has_rows(tmp_path):
+    (tmp_path / "figures").mkdir()
+    setup = SimpleNamespace(own=None, robot=ARM, is_quick=False, alone=True, request=Request())
+    run = experiment.Run(["mass", "gravity"], setup, tmp_path, Terminal(), None, Clock())
+    run.sections += [section("mass", GOOD), section("gravity", GOOD)]
+    run.clock.ends("mass")
+    assert [one.name for one in run.finished().sections] == ["mass"]
