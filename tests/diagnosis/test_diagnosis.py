@@ -9,6 +9,7 @@ from trees import one_body
 
 import tmt
 from compare.diagnosis import Values, diagnose
+from compare.diagnosis.fit import Fitted
 from compare.diagnosis.model import packed
 from compare.diagnosis.places import OF_ZERO, Place
 
@@ -112,6 +113,24 @@ def test_a_number_that_is_zero_is_said_as_zero():
     q, qd = Q[:, :1], QD[:, :1]
     causes = diagnose(wheel, Values.of(wheel, q, qd, np.full((len(q), 1, 1), 0.1), 0.0 * q)).causes
     assert {cause.explains for cause in causes if cause.place == "CoM x of body"} == {0.0}
+
+
+@pytest.mark.parametrize("changes, explains", [
+    ((0.1, 0.2), True), ((0.1, 1e-13), False), ((1e-13, 0.2), False), ((-3.0, 0.2), False),
+])  # fmt: skip
+def test_each_of_two_numbers_has_a_part_in_what_they_explain(changes, explains):
+    places = [Place("number", name, 2.0, "kg", 1.0, least=0.0) for name in ("mass of a", "mass of b")]
+    assert Fitted(tuple(places), changes, 0.5, 0.0).explains is explains
+    assert Fitted(tuple(places[:1]), (1e-13,), 0.5, 0.0).explains
+
+
+def test_rotors_divided_by_their_gears_are_one_cause():
+    """The numbers have many digits, their ratios to the right ones few."""
+    right, gears = np.array([0.777, 2.3, 0.583]), np.array([62.6, 107.8, 53.7])
+    geared = replace(ARM, armature=right)
+    cause, *_ = diagnosis(replace(ARM, armature=right / gears), geared).causes
+    assert (cause.place, cause.kind) == ("armature of alpha, beta and gamma", "several")
+    assert [float(x) for x in cause.explains.split(", ")] == pytest.approx((right / gears).tolist(), rel=1e-5)
 
 
 def test_three_numbers_are_named_together():
