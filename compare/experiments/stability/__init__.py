@@ -9,7 +9,7 @@ from ...core.finding import Finding
 from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...stability import push
-from ...stability.held import held
+from ...stability.equilibrium import equilibrium
 from .. import Drawing, Experiment
 from ..setup import Setup
 from . import claims, departure, limits, of_file
@@ -81,7 +81,7 @@ def begin_of_stated(setup: Setup) -> list[Runs]:
     dts = [coarsest_case(robot).scene.dt, *of(FINE_STEPS, (), FINE_STEPS[:1])]
     if setup.size != "full":
         centres, saddles = centres[:1], saddles[:1]
-    at = [held(robot, *place) for place in (*product(centres, dampings), *product(saddles, (0.0,)))]
+    at = [equilibrium(robot, *place) for place in (*product(centres, dampings), *product(saddles, (0.0,)))]
 
     def start(function: Callable[..., Any], items: Iterable[Any], **more: Any) -> Iterable[Any]:
         return setup.map(partial(function, engines=engines, **more), items)
@@ -90,7 +90,7 @@ def begin_of_stated(setup: Setup) -> list[Runs]:
         Runs(start(limits.limit_rows, at, methods=methods, steps=steps), limits.check_limits),
     ]
     if saddles:
-        runs = start(departure.departures, dts, at=held(robot, saddles[0]), methods=few)
+        runs = start(departure.departures, dts, at=equilibrium(robot, saddles[0]), methods=few)
         begun.append(Runs(runs, departure.check_departures))
     if robot.claims:
         runs = start(claims.holding_torques, [robot])

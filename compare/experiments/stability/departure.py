@@ -9,11 +9,9 @@ import numpy as np
 from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure
-from ...stability.held import NEGLIGIBLE, Held
+from ...stability.equilibrium import NEGLIGIBLE, Equilibrium
 from .subjects import mujoco_of, unit_of_movements
-from .tables import ClaimRow, DepartureRow
-
-Departure = DepartureRow | ClaimRow  # with a predicted and an observed time
+from .tables import DepartureRow
 
 LONGEST_DEPARTURE = 12.0  # s
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
@@ -23,7 +21,7 @@ DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observe
 INSTANT = 1e-6  # s
 
 
-def predicted(at: Held, scheme: str, dt: float, moved: np.ndarray, off: np.ndarray) -> list[float | None]:
+def predicted(at: Equilibrium, scheme: str, dt: float, moved: np.ndarray, off: np.ndarray) -> list[float | None]:
     """When the method's own linear map has a joint 0.1 rad or m away, s, for each of many starts; None: not within 12 s.
 
     moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (k, n) N m. The map
@@ -47,7 +45,7 @@ def predicted(at: Held, scheme: str, dt: float, moved: np.ndarray, off: np.ndarr
     return times
 
 
-def is_led(at: Held, scheme: str, dt: float) -> bool:
+def is_led(at: Equilibrium, scheme: str, dt: float) -> bool:
     """Whether a method's step lets no mode grow faster than the one along which a saddle is left.
 
     If it does, that mode outgrows the other from what rounding and squares of the deviation put into it, and the linear map
@@ -57,7 +55,7 @@ def is_led(at: Held, scheme: str, dt: float) -> bool:
 
 
 def departures(
-    dt: float, at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...]
+    dt: float, at: Equilibrium, engines: Mapping[str, Engine], methods: tuple[Method, ...]
 ) -> list[DepartureRow]:
     """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
     (rate, *_), vectors = at.modes
@@ -85,30 +83,25 @@ def departures(
 
 
 def check_departures(result: Result, rows: list[DepartureRow]) -> None:
-    """The table of departures and a check for each."""
+    """The table of departures and a check of each: to one step or 0.03 s; where the prediction stays, the run stays."""
     result.tables.setdefault("departure", []).extend(rows)
     for row in rows:
-        size = f"{row.perturbation:.0e} {row.unit}"
-        check_row(result, f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {size}", row)
+        off, size = late(row), f"{row.perturbation:.0e} {row.unit}"
+        missing = {"the run stays": row.observed, "the prediction stays": row.predicted}
+        note = " and ".join(text for text, time in missing.items() if time is None)
+        where, quantity = f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {size}", "departure, observed - predicted"
+        value = None if off is None else abs(off)
+        result.check(where, quantity, value, near(row), "s", note, about=About.PREDICTION)
 
 
-def late(row: Departure) -> float | None:
+def late(row: DepartureRow) -> float | None:
     """By how much a run leaves later than predicted, s: 0 where neither leaves, None where only one of them does."""
     if row.observed is None or row.predicted is None:
         return 0.0 if row.observed is row.predicted else None
     return row.observed - row.predicted
 
 
-def check_row(result: Result, where: str, row: Departure) -> None:
-    """The check of one departure: as predicted to one step or 0.03 s; where the prediction stays, the run stays too."""
-    off = late(row)
-    missing = {"the run stays": row.observed, "the prediction stays": row.predicted}
-    note = " and ".join(text for text, time in missing.items() if time is None)
-    value, quantity = None if off is None else abs(off), "departure, observed - predicted"
-    result.check(where, quantity, value, near(row), "s", note, about=About.PREDICTION)
-
-
-def near(row: Departure) -> float:
+def near(row: DepartureRow) -> float:
     """How near its prediction a departure is to be: one step or 0.03 s."""
     return max(DEPARTURE_TOLERANCE, row.dt) * (1.0 + 1e-9)
 
@@ -124,7 +117,7 @@ def departure_values(rows: list[DepartureRow]) -> dict[str, Any]:
 # torques that hold
 
 
-def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.ndarray:
+def own_torque(method: Method, engines: Mapping[str, Engine], at: Equilibrium) -> np.ndarray:
     """The torque under which the compiled arithmetic of an engine gives no acceleration at all at the posture, (n,) N m.
 
     MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
@@ -136,7 +129,7 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Held) -> np.nd
     return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
 
 
-def residual(method: Method, engines: Mapping[str, Engine], at: Held, tau: np.ndarray) -> np.ndarray:
+def residual(method: Method, engines: Mapping[str, Engine], at: Equilibrium, tau: np.ndarray) -> np.ndarray:
     """The torque by which tau, (..., n) N m, fails to hold the posture in the arithmetic of an engine, to less than an ulp.
 
     Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.

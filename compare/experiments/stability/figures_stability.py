@@ -14,7 +14,7 @@ from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from ..figures import MOST_ROWS, chart, named_rows
-from .claims import VARIANT, claims_of
+from .claims import NEAREST, claims_of
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
 from .subjects import fraction, unit_of_movements
@@ -153,53 +153,31 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
 
 
 def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
-    """Claims 1 and 2: departure against the push of the residual, and against the number of steps."""
+    """A panel for each claim that was tried: times of departure, the same over the steps, how far a kept posture moves."""
     claims, rows = claims_of(robot), result.tables["stability_claims"]
-    finer = [row for row in rows if row.claim == 2]
+    found = [claim for claim in (1, 2, 3) if any(row.claim == claim for row in rows)]
     fig = Figure(figsize=(WIDTH, 3.4), layout="constrained")
-    axes = fig.subplots(1, 1 + bool(finer), squeeze=False)[0]
-    draw_torques(axes[0], [row for row in rows if row.torque.startswith(VARIANT)], robot)
-    if finer:
-        draw_finer_steps(axes[1], finer, robot)
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
-    values = {"dt": fraction(claims.duration, claims.dt), "joint": robot.joints[0], "posture": claims.left}
-    return "stability_claims", fig, result.finding("figure_claims", **values, finer=bool(finer))
-
-
-def draw_torques(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
-    """Claim 1: when and to which side the posture is left, over the push of the residual on the unstable mode."""
-    symbol = robot.symbol(robot.joints[0])
-    for engine, fill in (("tmt", "full"), ("mujoco", "none")):
-        for side, mark, word in ((1, "^", "larger"), (-1, "v", "smaller")):
-            mine = [row for row in rows if (row.engine, row.direction) == (engine, side)]
-            pushes, times = [row.push for row in mine], [number_or_nan(row.observed) for row in mine]
-            label = f"{LABELS[engine]}, to {word} {symbol}"
-            looks: dict[str, Any] = {
-                "color": COLOURS[engine],
-                "fillstyle": fill,
-                "markersize": 5,
-                "label": label,
-            }
-            ax.plot(np.array(pushes) * 1e14, times, mark, **looks)
-    predicted = sorted((number_or_nan(row.push) * 1e14, number_or_nan(row.predicted)) for row in rows)
-    ax.plot(*np.array(predicted).reshape(-1, 2).T, color="black", linewidth=0.8, label="predicted")
-    ax.axvline(0.0, color="black", linewidth=0.5)
-    ax.set_title(f"claim 1: {claims_of(robot).left}")
-    ax.set_xlabel("initial acceleration of the unstable mode, 1e-14 rad/s2")
-    ax.set_ylabel(f"time until a movement of {LEFT:g} rad, s")
-
-
-def draw_finer_steps(ax: Axes, rows: list[ClaimRow], robot: Robot) -> None:
-    """Claim 2: when and to which side the posture is left against the number of steps, the torque one ulp off."""
-    duration = claims_of(robot).duration
-    for engine, sign in dict.fromkeys((row.engine, row.ulps or 0) for row in rows):
-        mine = [row for row in rows if (row.engine, row.ulps) == (engine, sign)]
-        counts, times = [duration / row.dt for row in mine], [number_or_nan(row.observed) for row in mine]
+    axes = fig.subplots(1, len(found), squeeze=False)[0]
+    for ax, claim in zip(axes, found):
+        series: dict[tuple[str, int], list[ClaimRow]] = {}
+        for row in rows:
+            if row.claim == claim and row.torque != NEAREST:
+                series.setdefault((row.engine, row.ulps or 0), []).append(row)
+        for (engine, sign), mine in series.items():
+            looks: dict[str, Any] = {"color": COLOURS[engine], "fillstyle": "full" if engine == "tmt" else "none"}
+            where = range(1, len(mine) + 1) if claim == 1 else [row.dt for row in mine]
+            values = [number_or_nan(row.moved if claim == 3 else row.observed) for row in mine]
+            if claim == 2:
+                ax.plot(where, values, "-" if sign > 0 else "--", color=COLOURS[engine])
+            for place, value, row in zip(where, values, mine):
+                ax.plot(place, value, "v" if row.direction == -1 else "^", markersize=5, **looks)
+        ax.set_title(f"claim {claim}: {claims.kept if claim == 3 else claims.left}")
+        ax.set_xlabel("torque within one ulp" if claim == 1 else "dt, s")
+        ax.set_ylabel("largest movement, rad" if claim == 3 else f"time until a movement of {LEFT:g} rad, s")
+        ax.set(xscale="linear" if claim == 1 else "log", yscale="log" if claim == 3 else "linear")
+    for engine in dict.fromkeys(row.engine for row in rows):
         fill = "full" if engine == "tmt" else "none"
-        ax.plot(counts, times, "-" if sign > 0 else "--", color=COLOURS[engine])
-        for row, count, time in zip(mine, counts, times):
-            mark = "v" if row.direction == -1 else "^"
-            ax.plot(count, time, mark, color=COLOURS[engine], fillstyle=fill, markersize=5)
-    ax.set(title=f"claim 2: {claims_of(robot).left}", xscale="log", xlabel=f"steps in {duration:g} s")
-    ax.set_xticks([32, 512, 8192], ["32", "512", "8192"])
-    ax.minorticks_off()
+        axes[0].plot([], [], "^", color=COLOURS[engine], fillstyle=fill, label=LABELS[engine])
+    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
+    about = {"dt": fraction(claims.duration, claims.dt), "joint": robot.joints[0], "posture": claims.left, "kept": claims.kept}
+    return "stability_claims", fig, result.finding("figure_claims", **about, panels=len(found))

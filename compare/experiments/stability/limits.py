@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core.check import About, Result
 from ...engines import Engine, Method
-from ...stability.held import Held
+from ...stability.equilibrium import Equilibrium
 from ...stability.search import largest
 from .tables import LimitRow
 
@@ -33,7 +33,7 @@ class Observed(NamedTuple):
 
 
 def limit_rows(
-    at: Held, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
+    at: Equilibrium, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
 ) -> list[Observed]:
     """The limits of one posture, predicted and observed."""
     rows, fastest = [], np.abs(at.modes[0]).max()
@@ -55,7 +55,7 @@ def limit_rows(
 
 
 def observed_limit(
-    method: Method, engines: Mapping[str, Engine], at: Held, steps: int, tried: Sequence[float]
+    method: Method, engines: Mapping[str, Engine], at: Equilibrium, steps: int, tried: Sequence[float]
 ) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run.
 
@@ -73,7 +73,7 @@ def observed_limit(
 
 
 def shares(
-    method: Method, engines: Mapping[str, Engine], at: Held, dt: float, steps: int
+    method: Method, engines: Mapping[str, Engine], at: Equilibrium, dt: float, steps: int
 ) -> list[np.ndarray]:
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
@@ -106,7 +106,7 @@ def is_seen(rates: np.ndarray, small: float, duration: float) -> np.ndarray:
     return seen if seen.any() else np.ones_like(seen)
 
 
-def quarter_of(at: Held, dt: float, steps: int) -> int:
+def quarter_of(at: Equilibrium, dt: float, steps: int) -> int:
     """Steps of a quarter of a run: a quarter of `steps`, and at least a swing of the slowest mode."""
     swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
     if not len(swings):
@@ -114,7 +114,7 @@ def quarter_of(at: Held, dt: float, steps: int) -> int:
     return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
 
 
-def limit_tolerance(at: Held, scheme: str, limit: float, steps: int) -> float:
+def limit_tolerance(at: Equilibrium, scheme: str, limit: float, steps: int) -> float:
     """How far an observed limit may be from the predicted one, relative: 0.1 %, or from where a run shows the growth.
 
     With little damping a mode hardly grows just above its limit.

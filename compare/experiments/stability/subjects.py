@@ -11,7 +11,7 @@ from ...engines import Engine, Method, one_of_each_scheme, same_scheme
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...robots import Robot
 from ...robots.case import Case
-from ...stability.held import held, posture_names
+from ...stability.equilibrium import equilibrium, posture_names
 
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint")  # tmt's names
@@ -32,7 +32,7 @@ def subjects_of(robot: Robot) -> Subjects:
         {name: of[name] for name in names if name in of} for of in (robot.postures, robot.positions)
     )
     robot = replace(robot, postures=postures, positions=positions)
-    at = {name: held(robot, name) for name in posture_names(robot)}
+    at = {name: equilibrium(robot, name) for name in posture_names(robot)}
     centres = [name for name in at if at[name].stays and not at[name].without_stiffness.all()]
     saddles = [name for name in at if at[name].kind == "saddle"]
     centres.sort(key=lambda name: name != robot.kinds.get("centre"))

@@ -65,8 +65,6 @@ class ClaimRow(OfMethod):
     claim: int
     dt: float = time_step()
     torque: str = ""  # one of those that hold the posture
-    push: float | None = column("rad_per_s2", optional=True)  # of the residual, to the fastest unstable mode
-    predicted: float | None = column("s", optional=True)
     observed: float | None = column("s")
     direction: int | None
     moved: float | None = column("rad")

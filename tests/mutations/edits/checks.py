@@ -11,8 +11,8 @@ CHECKS = (
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
     ("judge.run", "check_movement", '"movement"'), ("trajectory.runs", "check_level", "quantity"),
     ("stability.limits", "check_limits", "what"),
-    ("stability.limits", "check_limits", "quantity"), ("departure", "check_row", "quantity"),
-    ("claims", "check_torques", "text"), ("claims", "check_torques", "quantity"),
+    ("stability.limits", "check_limits", "quantity"), ("departure", "check_departures", "quantity"),
+    ("claims", "check_torques", "quantity"),
     ("claims", "check_finer_steps", "quantity"), ("claims", "check_kept", "what"),
 
 )  # fmt: skip
