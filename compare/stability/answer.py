@@ -143,7 +143,7 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
     if question.drawn and rows[0].judged_by == "rest" and period is None:
         for push in DRAWN:
             for name in question.integrators if push <= pushed.survived else ():
-                pushed.limit(push, name)
+                pushed.limit(push, name, surely=push == pushed.push)
     smaller = None
     if question.helped and own and own.stable_at_file_dt is False:
         found = remedies(pushed) if period is None else []
@@ -179,7 +179,9 @@ def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:
     row.place = "by chance" if pushed.place_is_chance(push) else ""
     row.fine_apart = known(max(pushed.twice(push, way) for way in range(WAYS)))
     if question.control_period is None:
-        limit, verdict = pushed.limit(push, integrator), pushed.verdict(push, dt, integrator)
+        limit = pushed.limit(push, integrator)
+        pushed.sure(push, dt, integrator)
+        verdict = pushed.verdict(push, dt, integrator)
     else:
         limit, verdict = (
             period_limit(pushed, integrator),

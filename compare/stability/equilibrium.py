@@ -12,7 +12,11 @@ from ..robots.case import SEED, Case
 from ..robots.coordinates import floats
 
 LONGEST_STEP = 1e3  # s, to which a limit is sought
-LEAST, EXPLICIT, SCANNED = 0.01, 10.0, 121  # times the fastest rate: where it begins, what explicit methods bear; steps
+LEAST, EXPLICIT, SCANNED = (
+    0.01,
+    10.0,
+    121,
+)  # times the fastest rate: where it begins, what explicit methods bear; steps
 NEUTRAL = 1e-9  # growth in a step that can be rounding
 NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
 SLOWEST = 1e-6  # 1/s: a rate below is zero
@@ -102,7 +106,9 @@ class Equilibrium:
         q, rest = self.moved(MOVED * np.array([-1.0, 0.0, 1.0])[:, None] * along), np.zeros((3, self.nv))
         torques = tmt.inverse_dynamics(q, rest, rest, self.tree)
         push = (torques[0] - 2.0 * torques[1] + torques[2]) / MOVED**2 @ soft
-        return bool(np.abs(push).max(initial=0.0) <= NEGLIGIBLE * np.abs(self.mass_matrix @ by_movement).max())
+        return bool(
+            np.abs(push).max(initial=0.0) <= NEGLIGIBLE * np.abs(self.mass_matrix @ by_movement).max()
+        )
 
     def step(self, name: str, dt: np.ndarray | float) -> np.ndarray:
         """The amplification of a step of a method of tmt, (..., 2nv, 2nv) for dt, s, (...)."""

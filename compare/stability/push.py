@@ -8,6 +8,8 @@
   usual push. A fine run that is not finite is refined up to three times; if it never is, nothing is judged.
 - The usual push is 0.1 rad/s or m/s, or the largest up to which fine runs come to rest, or coast no faster than
   the push.
+- The longest step that is found is tried with eight further patterns, in longer runs, and so is one that is shorter by 6 %. What fails does so
+  again 8 % further up: in between it depends on the push.
 - A step holds if after each pattern the run is as still at its end as fine runs are, grows no more, and ends where
   they do; what is free may slide and turn on its floor. Where fine runs of two steps or patterns end elsewhere the
   place is chance, and is not judged.
@@ -29,26 +31,22 @@ from .motion import Motion
 from .search import largest
 
 PUSHES = (0.001, 0.01, 0.03, 0.1, 0.3, 1.0)  # rad/s or m/s, of every speed
-USUAL, WAYS = 0.1, 4  # of these pushes; patterns of signs
+USUAL = 0.1  # of these pushes
+WAYS, MORE_WAYS = 4, 8  # patterns of signs, and further ones for the step that is found
+BELOW, ABOVE, ROUNDS = 0.94, 1.08, 8  # of that step, of one that fails, and how far up that is sought
 LASTS, MOST_STEPS = 3.0, 20_000  # s and steps of a run
-STILL, STILLER, COASTS, AS_FAST, FAST = (
-    0.05,
-    0.01,
-    1.5,
-    3.0,
-    100.0,
-)  # rad/s or m/s, twice; fold, twice; rad/s or m/s
-GROWS, LONGER = (
-    1.05,
-    3.0,
-)  # fold, from the middle to the last third of a run; fold, the run that shows whether it goes on
+STILL, STILLER = 0.05, 0.01  # rad/s or m/s: what is still after a push, and after a small one
+COASTS, AS_FAST, FAST = 1.5, 3.0, 100.0  # fold of a push, fold of a fine run, rad/s or m/s
+GROWS = 1.05  # fold, from the middle to the last third of a run
+LONGER, SURELY = 3.0, 4.0 / 3.0  # fold: the run that shows whether it goes on, and those of further patterns
 CALM = 0.7  # s: what is still for as long stays so
 DAMPED = 0.5  # of the speed that fine runs keep: a step that leaves less damps
 FREELY = 0.9  # of the speed of what nothing holds or brakes
 JUMP, AT_ONCE = 1.0, 0.01  # rad/s or m/s within s: the start is not one in which the robot can be
 QUIET, REFINED = 1e-5, 3  # rad/s or m/s, without a push; times
 ELSEWHERE, BY_CHANCE, EARLY = 0.3, 0.1, 0.5  # rad or m, twice; s: judged where the end is chance
-LONGEST, WITHIN, FINER, FINEST = 0.2, 1.06, 8, 5e-4  # s; fold; fold; s
+LONGEST, WITHIN = 0.2, 1.06  # s; fold
+FINER, FINEST = 8, 5e-4  # fold of the step in use, s: fine steps
 SAMPLES = 100  # of the way of a run
 
 
@@ -116,13 +114,14 @@ class Pushed:
         self.fine_dt = min(max(dt / FINER, LASTS / MOST_STEPS), dt / 2.0, FINEST)
         self.lasts = min(motion.times[-1] if len(motion.times) else LASTS, MOST_STEPS * self.fine_dt)
         rng, nv = np.random.default_rng(0), motion.model.nv
-        self.signs = [np.sign(rng.normal(size=nv)) for _ in range(WAYS)]
+        self.signs = [np.sign(rng.normal(size=nv)) for _ in range(WAYS + MORE_WAYS)]
         self.stepper, self.is_of_fine = Stepper(self.model, dt, integrator), False
         speeds = motion.state[self.stepper.places["qvel"]]
         self.is_in_motion = bool(speeds.any() or len(motion.times))
         self.truth, self.survived = integrator, 0.0
         self.fine, self.by_twice = dict[tuple[float, int], Run](), dict[tuple[float, int], float]()
         self.tried = dict[tuple[float, float, str, float, float], Verdict]()
+        self.surely = set[tuple[float, float, str, float, float]]()
 
     def run(
         self, push: float, way: int, dt: float, integrator: str, period: float = 0.0, delay: float = 0.0,
@@ -360,11 +359,54 @@ class Pushed:
             return "grows"
         return "elsewhere" if not is_chance and self.rests and self.elsewhere(run, fine) > ELSEWHERE else ""
 
-    def limit(self, push: float, integrator: str) -> Limit:
-        """The longest step after a push, from the step in use upwards or downwards."""
+    def sure(self, push: float, dt: float, integrator: str) -> bool:
+        """Whether a step holds after further patterns of signs too; where they end is not asked."""
+        key, verdict = (push, dt, integrator, 0.0, 0.0), self.verdict(push, dt, integrator)
+        if not verdict.holds or key in self.surely:
+            return verdict.holds
+        fine = [self.fine_run(push, way) for way in range(WAYS)]
+        most = np.max([run.most for run in fine], axis=0)
+        bounds = {"rest": (self.still(push), np.inf), "speed": (np.inf, AS_FAST * np.maximum(most, push))}
+        last_bound, most_bound = bounds.get(self.judged_by, (np.inf, np.inf))
+        fastest = max(FAST, 10.0 * float(most.max()))
+        lasts = self.lasts if len(self.motion.times) else SURELY * self.lasts
+        for way in range(WAYS, WAYS + MORE_WAYS):
+            run = self.run(push, way, dt, integrator, fast=fastest, lasts=lasts)
+            if not (run.is_finite and run.last.max() <= last_bound and (run.most <= most_bound).all()):
+                why, speed = "moves" if run.is_finite else "diverges", float(run.last.max())
+                fast = run.speeds > AS_FAST * np.maximum(most, push)
+                dof = int(fast[fast.any(axis=1).argmax()].argmax()) if fast.any() else int(run.last.argmax())
+                self.tried[key] = verdict._replace(why=why, dof=dof, speed=max(speed, verdict.speed))
+                return False
+        self.surely.add(key)
+        return True
+
+    def limit(self, push: float, integrator: str, surely: bool = True) -> Limit:
+        """The longest step after a push, from the step in use upwards or downwards.
+
+        surely: it, and one that is shorter by BELOW, hold after further patterns too, and so does the one in use; that which
+        fails does so a factor ABOVE further up again. Between both it depends on the push.
+        """
         low, high = largest(
             lambda dt: self.verdict(push, dt, integrator).holds, self.dt, self.fine_dt, self.longest, WITHIN
         )
+        if surely and low is not None:
+
+            def is_sure(dt: float) -> bool:
+                return self.sure(push, dt, integrator) and self.sure(
+                    push, max(BELOW * dt, self.fine_dt), integrator
+                )
+
+            if not is_sure(low):
+                lower, higher = largest(is_sure, low, self.fine_dt, low, WITHIN)
+                is_own = (lower or 0.0) < self.dt <= low and self.sure(push, self.dt, integrator)
+                low, high = (self.dt, high) if is_own else (lower, higher)
+        failing = high or 0.0
+        for _ in range(ROUNDS if surely and failing else 0):
+            if not self.sure(push, failing, integrator) and not self.sure(push, ABOVE * failing, integrator):
+                high = failing
+                break
+            failing *= ABOVE
         return Limit(low, high, self.verdict(push, high, integrator).dof if high else None)
 
 
