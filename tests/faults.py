@@ -185,7 +185,9 @@ def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
 def outcome(fault: Fault) -> tuple[str, list[str]]:
     found = diagnosis_of(fault, seed=3)
     places = [cause.place for cause in found.causes]
-    named = [cause for cause in found.causes if fault.place in (cause.place, f"{cause.place}: {cause.explains}")]
+    named = [
+        cause for cause in found.causes if fault.place in (cause.place, f"{cause.place}: {cause.explains}")
+    ]
     if named and (not fault.values or np.isclose(named[0].explains, fault.values[0], rtol=1e-6, atol=1e-9)):
         return "named", places
     if not found.causes:

@@ -275,7 +275,9 @@ def test_a_wrong_number_in_values_with_noise_has_its_uncertainty(of):
     rng = np.random.default_rng(5)
     states = dict(zip(("q", "qd", "tau"), rng.uniform(-2.0, 2.0, (3, 200, 2))))
     function = RIGHT[of]
-    values = np.array([function(*state[: 3 if of == "acceleration" else 2]) for state in zip(*states.values())])
+    values = np.array(
+        [function(*state[: 3 if of == "acceleration" else 2]) for state in zip(*states.values())]
+    )
     values = values * (1.0 + 1e-3 * rng.normal(size=values.shape))
     states = states if of == "acceleration" else {name: states[name] for name in ("q", "qd")}
     said = message_of(HEAVIER, **{of: values}, **states).partition("Probable cause: mass of body")[2].split()
@@ -307,7 +309,9 @@ def test_a_table_without_speeds_says_that_velocity_terms_were_not_compared(qd, w
         warnings.simplefilter("always")
         agrees(bias=bias, q=q, qd=qd)
         agrees(mass_matrix=mass_matrix, q=q, qd=qd)
-    assert [("velocity terms" in str(one.message), one.filename) for one in caught] == [(True, __file__)] * warns
+    assert [("velocity terms" in str(one.message), one.filename) for one in caught] == [
+        (True, __file__)
+    ] * warns
 
 
 def test_an_entry_that_agrees_has_no_cause():

@@ -132,7 +132,9 @@ def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(insid
         assert len(said) == status and all(0 < line.index("-9.81 ") < line.index("-9.8 ") for line in said)
 
 
-def test_the_answer_as_json_is_all_that_is_printed_and_the_page_is_opened(inside, tmp_path, capsys, monkeypatch):
+def test_the_answer_as_json_is_all_that_is_printed_and_the_page_is_opened(
+    inside, tmp_path, capsys, monkeypatch
+):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
     path, out = tmp_path / "two.xml", tmp_path / "out"

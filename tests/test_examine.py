@@ -96,7 +96,9 @@ def test_a_report_that_cannot_be_made_is_one_line_and_the_earlier_one_is_whole(t
 
 
 @pytest.mark.parametrize("is_earlier", [False, True])
-def test_after_an_interrupt_what_is_finished_is_reported_and_an_earlier_report_stays(tmp_path, monkeypatch, is_earlier):
+def test_after_an_interrupt_what_is_finished_is_reported_and_an_earlier_report_stays(
+    tmp_path, monkeypatch, is_earlier
+):
     def first(setup):
         result = Result("first", shown=[])
         result.check("zero", "a", 0.5, 1.0, "m")
@@ -124,7 +126,9 @@ def test_after_an_interrupt_what_is_finished_is_reported_and_an_earlier_report_s
     assert [skipped["experiment"] for skipped in results["skipped"]] == ["second"]
     assert not is_earlier or earlier.read_text() == before
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names == ({"results.json", "interrupted"} if is_earlier else names) and not any(".new" in name for name in names)
+    assert names == ({"results.json", "interrupted"} if is_earlier else names) and not any(
+        ".new" in name for name in names
+    )
 
 
 def test_a_problem_of_a_users_function_is_told_once_by_an_experiment_that_asks_it():

@@ -29,5 +29,7 @@ class Cause:
     def record(self) -> dict[str, Any]:
         """As in results.json and in a report."""
         values = {"stated": self.stated, "found": self.explains}
-        unknown = {name: None for name, value in values.items() if isinstance(value, float) and not isfinite(value)}
+        unknown = {
+            name: None for name, value in values.items() if isinstance(value, float) and not isfinite(value)
+        }
         return {"rank": self.rank, "place": self.place} | values | unknown | {"text": self.text}

@@ -59,4 +59,6 @@ def skipped(name: str, robot: "Robot", engines: str | None = None) -> Finding | 
     if asked and not {*asked} & {*robot.own}:
         return Finding("shared", "nothing_given", {"asked": asked})
     is_without = engines and EXPERIMENTS[name].asks_others and {*engines.split(",")} <= {*ALWAYS}
-    return Finding(name, "none_chosen", {"engines": engines}) if is_without else functions(name).skipped(robot)
+    return (
+        Finding(name, "none_chosen", {"engines": engines}) if is_without else functions(name).skipped(robot)
+    )

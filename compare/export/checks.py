@@ -73,7 +73,7 @@ def checked(
     """
     kind, names = np.float32 if single else np.float64, dict.fromkeys(quantities)
     states = [x.astype(kind).astype(float) for x in random_states(compared.robot, count)]
-    tree, factor, rows = compared.robot.tree, FACTOR * float(np.finfo(kind).eps), []
+    tree, factor, rows = compared.robot.tree, FACTOR * float(np.finfo(kind).eps), list[Row]()
     mujoco = compared.mujoco.of(compared.robot.case())
     try:
         program = make()
@@ -131,13 +131,13 @@ def scales_of(entries: Entries, name: str, states: States, exact: Pairs) -> Sequ
         return entries.force_rates(third)
     if function in ("derivatives", "step_derivatives"):
         qdd, by = tmt.acceleration(q, qd, third, tree), tmt.derivatives(q, qd, third, tree)
-        scale = entries.derivatives(third, qdd, by)
-        return scale if function == "derivatives" else [entries.step(dt[:, :, None], by, scale)]
+        of_rates = entries.derivatives(third, qdd, by)
+        return of_rates if function == "derivatives" else [entries.step(dt[:, :, None], by, of_rates)]
     # what belongs to a frame is that of a body that has its centre of mass there
     site, names = tree.site_of(argument), [f"body {b}" for b in range(len(tree.mass) + 1)]
     body = {"body_joint": site.joint, "mass": 0.0, "com": site.offset, "inertia": np.zeros((3, 3))}
-    fields = {field: [*getattr(tree, field), value] for field, value in body.items()}
-    of_body = Entries(replace(tree, body_names=names, **fields), q, qd)
+    fields = {field: (*getattr(tree, field), value) for field, value in body.items()}
+    of_body = Entries(tmt.Tree(**vars(tree) | fields | {"body_names": tuple(names)}), q, qd)
     if function == "frame_pose":
         scale = np.full(exact.high.shape, float(of_body.count[-1]))
         scale[..., 3] = of_body.positions[:, -1]

@@ -193,7 +193,7 @@ class Entries:
         by_q, by_qd, by_tau = map(self.solved, (by_movement, by_speed, unit_torques), by[:3])
         return tmt.Derivatives(by_q, by_qd, by_tau, by_movement, by_speed)
 
-    def step(self, dt: float, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
+    def step(self, dt: float | np.ndarray, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
         """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through it.
 
         by: the derivatives at the start, of which a step makes the first terms of an exponential; scale:

@@ -62,14 +62,19 @@ SLIPS = {  # the place and what it explains
     "sign in omega": ("angular velocity of arm, x in its own axes", "pan' with the other sign"),
     "factor 2 of v^2": ("2 (offset of tilt) * (CoM of arm) in v^2 of arm", 0.5),
     "inertia not turned": ("inertia of arm", "not turned to the inertial frame"),
-    "gradient of the other sign in one row": ("gradient of the kinetic energy in h[tilt]", "of the other sign"),
+    "gradient of the other sign in one row": (
+        "gradient of the kinetic energy in h[tilt]",
+        "of the other sign",
+    ),
 }
 
 
 def given(slip, count=12):
     M, h = derived(slip)
     q, qd = np.random.default_rng(4).uniform(-2.0, 2.0, (2, count, 2))
-    values = Values.of(TREE, q, qd, np.array([M(x) for x in q]), np.array([h(*state) for state in zip(q, qd)]))
+    values = Values.of(
+        TREE, q, qd, np.array([M(x) for x in q]), np.array([h(*state) for state in zip(q, qd)])
+    )
     return values, lambda speeds: np.array([h(*state) for state in zip(q, speeds)])
 
 
@@ -83,5 +88,8 @@ def test_a_slip_of_the_derivation_is_named_among_the_first(slip):
     """A sign of one component of two is that of the other."""
     values, bias = given(slip)
     causes = diagnose(TREE, values, bias=bias).causes[:3]
-    named = {(cause.place, cause.explains if isinstance(cause.explains, str) else round(cause.explains, 9)) for cause in causes}
+    named = {
+        (cause.place, cause.explains if isinstance(cause.explains, str) else round(cause.explains, 9))
+        for cause in causes
+    }
     assert SLIPS[slip] in named

@@ -216,7 +216,9 @@ def test_every_slip_of_the_recursion_changes_something_in_some_model():
 ])  # fmt: skip
 def test_a_slip_of_the_derivation_is_named(kind, place, explains):
     equations = Equations(BENT_ARM, *states(BENT_ARM), Layout(3, True, False))
-    given = next(values for cause, values in kind(equations) if (cause.place, cause.explains) == (place, explains))
+    given = next(
+        values for cause, values in kind(equations) if (cause.place, cause.explains) == (place, explains)
+    )
     assert np.abs(given - equations.right).max() > 1e-6
     M, velocity_terms, rest = given[:, :9].reshape(-1, 3, 3), given[:, 9:12], given[:, 12:]
     found = of_parts(BENT_ARM, M, velocity_terms, rest)

@@ -159,7 +159,9 @@ def test_a_mass_matrix_is_symmetric_within_the_scale_of_each_entry(share, passes
 ])  # fmt: skip
 def test_the_headline_has_the_largest_share_and_what_is_no_number_first(rows, top):
     result = Result("mass")
-    result.rows = [SimpleNamespace(worst_difference=worst, difference_over_bar=share) for worst, share in rows]
+    result.rows = [
+        SimpleNamespace(worst_difference=worst, difference_over_bar=share) for worst, share in rows
+    ]
     finding = mass.headline(result)
     assert (finding and finding.values["row"]) is (None if top is None else result.rows[top])
 
@@ -205,8 +207,18 @@ def test_the_printed_digits_of_f2_and_f3_are_met_to_half_a_unit_of_the_last(off,
     (0.99, -0.99, True), (1.01, 0.0, False), (0.0, 1.01, False), (0.0, -1.01, False), (1.01, 1.01, False),
 ])  # fmt: skip
 def test_a_printed_number_is_met_if_both_engines_meet_it(of_tmt, of_mujoco, is_met):
-    about = {"item": "c", "posture": "", "quantity": "Mbar", "component": "", "unit": "", "exact": 2.0, "published": 2.0}
-    row = published.PrintedRow(tmt=2.0 + of_tmt * 1e-4, mujoco=2.0 + of_mujoco * 1e-4, tolerance=1e-4, **about)
+    about = {
+        "item": "c",
+        "posture": "",
+        "quantity": "Mbar",
+        "component": "",
+        "unit": "",
+        "exact": 2.0,
+        "published": 2.0,
+    }
+    row = published.PrintedRow(
+        tmt=2.0 + of_tmt * 1e-4, mujoco=2.0 + of_mujoco * 1e-4, tolerance=1e-4, **about
+    )
     assert row.is_met is is_met
 
 

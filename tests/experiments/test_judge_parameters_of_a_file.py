@@ -67,11 +67,17 @@ def test_a_number_may_be_off_by_its_tolerance(quantity, stated, share, passes):
 def test_a_row_has_what_is_compiled_less_what_is_stated():
     stated, compiled = np.array([1.0, 2.0, -3.0]), np.array([1.5, 2.0, 3.0])
     rows = rows_of(Stated("arm", "com", stated, compiled), "m")
-    assert [(row.stated, row.compiled, row.difference) for row in rows] == [(1.0, 1.5, 0.5), (2.0, 2.0, 0.0), (-3.0, 3.0, 6.0)]
+    assert [(row.stated, row.compiled, row.difference) for row in rows] == [
+        (1.0, 1.5, 0.5),
+        (2.0, 2.0, 0.0),
+        (-3.0, 3.0, 6.0),
+    ]
     assert rows_of(Stated("arm", "com", None, compiled), "m")[0].difference is None
 
 
-@pytest.mark.parametrize("compiled, rank, is_said", [([0.0, -0.6, -0.8], 1, True), ([0.0, -0.6, 0.8], 2, False)])
+@pytest.mark.parametrize(
+    "compiled, rank, is_said", [([0.0, -0.6, -0.8], 1, True), ([0.0, -0.6, 0.8], 2, False)]
+)
 def test_an_axis_of_the_opposite_sense_is_a_convention_and_is_said(compiled, rank, is_said):
     number = Stated("elbow", "axis", np.array([0.0, 0.6, 0.8]), np.array(compiled), tolerance=1e-12)
     causes = compare_number(Result("parameters"), number, "", {}).causes

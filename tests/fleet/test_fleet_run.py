@@ -112,7 +112,12 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
     assert len(first.executor.calls) == 2 and second.executor.calls == [] and second.rows == first.rows
     third = fleet({"b.xml": PENDULUM.format(0.3), "b/a.xml": PENDULUM.format(0.4)}, answer=agrees)
     assert set(third.executor.calls) == {"m/b.xml", "m/b/a.xml"}
-    for name, act in (".fleet", Path.unlink), ("index.html", Path.unlink), ("index.html", edit), (".fleet", edit):
+    for name, act in (
+        (".fleet", Path.unlink),
+        ("index.html", Path.unlink),
+        ("index.html", edit),
+        (".fleet", edit),
+    ):
         act(report(tmp_path, "b.xml") / name)  # a saved result that is gone or edited is made anew
         assert fleet({}, answer=agrees).executor.calls == ["m/b.xml"], name
     for more in ({"is_quick": False}, {"names": ("gravity",)}):

@@ -98,7 +98,9 @@ def test_what_needs_a_look_comes_first():
 
 def cells_of(rows, **more):
     """report.md of a fleet, and the cells of its page."""
-    text = table.document_of(rows, **{"summary": ["3 files"], "left_out": (), "origin": {"command": "c"}} | more)
+    text = table.document_of(
+        rows, **{"summary": ["3 files"], "left_out": (), "origin": {"command": "c"}} | more
+    )
     page = page_of("A fleet", text, True)
     return text, page, [re.findall("<td>(.*?)</td>", line) for line in page.split("<tr>")[2:]]
 
@@ -128,5 +130,7 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
     assert tuple(found[0]) == table.FLEET_COLUMNS and found[0]["worst_ratio"] == "0.123456"
     for name in ("index.html", "report.md"):
         text = (tmp_path / name).read_text()
-        assert all(part in text for part in ("early.xml", "the command", '"files/c.xml/index.html">d.xml</a>'))
+        assert all(
+            part in text for part in ("early.xml", "the command", '"files/c.xml/index.html">d.xml</a>')
+        )
         assert text.index(">b.xml<") < text.index(">c.xml<") < text.index(">a b.xml<")

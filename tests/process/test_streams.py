@@ -20,12 +20,16 @@ def test_so_much_is_printed_and_no_more(more, capsys, monkeypatch):
     say_error("what the program says")
     shown = capsys.readouterr().err.splitlines()
     assert shown[0].removesuffix(f"{streams.PROGRAM}: what the program says")[-2:] == "ab"
-    assert [len(line) for line in shown[:1 + more]][:more] == [streams.MOST_PRINTED] * more
-    assert ("no more is shown" in "".join(shown)) == bool(more) and "c" not in shown[0][: streams.MOST_PRINTED]
+    assert [len(line) for line in shown[: 1 + more]][:more] == [streams.MOST_PRINTED] * more
+    assert ("no more is shown" in "".join(shown)) == bool(more) and "c" not in shown[0][
+        : streams.MOST_PRINTED
+    ]
     assert shown[-1].endswith("what the program says")
 
 
-def test_own_equations_that_change_the_folder_have_their_report_where_it_was_asked_for(inside, tmp_path, monkeypatch):
+def test_own_equations_that_change_the_folder_have_their_report_where_it_was_asked_for(
+    inside, tmp_path, monkeypatch
+):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "double.xml").write_text(own_equations.XML)
     lines = "import os", "from own_equations import bias, mass_matrix", "os.chdir('elsewhere')"

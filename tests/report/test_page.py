@@ -87,22 +87,38 @@ BROKEN = "runs to its end", None, 0.0, "equal", False, About.PROGRAM
 def test_what_broke_off_or_was_not_judged_is_on_the_first_screen_and_in_its_section_and_no_other_is(folder):
     open_section = section("gravity", GOOD)
     open_section.result.not_judged("held", "torque", "nothing moves")
-    sections = [section("mass", GOOD), open_section, section("speed", GOOD, BROKEN), section("trajectory", BAD)]
+    sections = [
+        section("mass", GOOD),
+        open_section,
+        section("speed", GOOD, BROKEN),
+        section("trajectory", BAD),
+    ]
     for one, what in zip(sections, (None, "torque", "runs to its end", "Mbar")):
         top, rest = page_of(folder, [one])
         text = Document(report_of(folder, [one])).text().partition("<section")[2]
         first = re.findall(rf"<td>{one.name}</td>\s<td>\w*</td>\s<td>([^<]*)</td>", top)
         assert first == [what] * (what is not None)
-        assert [f"{label}:**" in rest for label in ("Failing checks", "Not judged")] == [False, False]  # no markup is left
+        assert [f"{label}:**" in rest for label in ("Failing checks", "Not judged")] == [
+            False,
+            False,
+        ]  # no markup is left
         labels = [f"<strong>{label}:</strong>" in rest for label in ("Failing checks", "Not judged")]
         assert labels == [what not in (None, "torque"), what == "torque"]
         assert labels == [f"**{label}:**" in text for label in ("Failing checks", "Not judged")]
         assert ("<td>not judged</td>" in top) == (what == "torque")
         assert ("nothing moves" in rest) == ("nothing moves" in text) == (what == "torque")
     page = "".join(page_of(folder, sections))
-    links = re.findall(r'<a href="#(\w+)">(<span class="mark bad"[^<]*✗</span>)?(?:\w+)</a>', page.partition("<main")[0])
+    links = re.findall(
+        r'<a href="#(\w+)">(<span class="mark bad"[^<]*✗</span>)?(?:\w+)</a>', page.partition("<main")[0]
+    )
     assert {name for name, mark in links if mark} == {"speed", "trajectory"}
-    assert {name for name, mark in links if not mark} == {"main", "questions", "mass", "gravity", "provenance"}
+    assert {name for name, mark in links if not mark} == {
+        "main",
+        "questions",
+        "mass",
+        "gravity",
+        "provenance",
+    }
 
 
 def test_what_was_interrupted_has_not_passed_whatever_its_checks_say(folder):

@@ -57,7 +57,9 @@ def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
 
 
 def text_of(*sections):
-    return Document(Report(sections, replace(ARM, questions=()), {"command": "c"}, "Worst in <i>.", (), ())).text()
+    return Document(
+        Report(sections, replace(ARM, questions=()), {"command": "c"}, "Worst in <i>.", (), ())
+    ).text()
 
 
 def test_report_md_is_short_whatever_there_is_to_say():

@@ -40,7 +40,9 @@ def failing(case, engines, *integrators) -> set:
 @dataclasses.dataclass(frozen=True)
 class ExplicitDamping(SemiImplicitEuler):
     def stiffness_and_damping(self, tree):
-        return SemiImplicitEuler.stiffness_and_damping(self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0)))
+        return SemiImplicitEuler.stiffness_and_damping(
+            self, dataclasses.replace(tree, damping=(0.0, 0.0, 0.0))
+        )
 
 
 HASTY = METHODS["rk4"].b + 1e6 * EPS * np.array([1.0, 0.0, 0.0, -1.0])
