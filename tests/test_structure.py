@@ -19,7 +19,7 @@ LIBRARIES = {
     "mujoco": "engines.mujoco engines.mjx engines.newton engines.warp engines.outside.as_it_runs stability",
     "mujoco_warp": "engines.warp", "warp": "engines.newton engines.warp",
     "jax": "engines.mjx export.programs", "heyoka": "engines.heyoka",
-    "newton": "engines.newton", "pinocchio": "engines.pinocchio", "pydrake": "engines.drake", "pandas": "report",
+    "newton": "engines.newton", "pinocchio": "engines.pinocchio", "pydrake": "engines.drake", "pandas": "report stability.api",
     "matplotlib": "report.style", "PIL": "report.images", "distributed": "fleet.executors", "rich": "report.terminal",
 }  # fmt: skip
 SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "followed", "quantities", "setup"))
