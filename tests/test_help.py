@@ -21,7 +21,7 @@ from compare.report.provenance import OURS, installed
 from compare.robots.arm import ARM
 from compare.robots.scene_file import read_scenes
 
-PARTS = ["Asks", "Compares", "Tables", "Figures", "Tolerance", "Examples"]
+PARTS = ["Tables", "Tolerance", "Examples"]
 
 POSITIONS = """
 
