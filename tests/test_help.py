@@ -13,15 +13,13 @@ from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
 from compare.__main__ import main
-from compare.cli.command_line import LINE_WIDTH, OPTIONS, command_parser, help_of, request
+from compare.cli.command_line import LINE_WIDTH, OPTIONS, command_parser, request
 from compare.experiments import EXPERIMENTS, skipped
 from compare.export.command import OPTIONS as OF_EQUATIONS
 from compare.fleet.command import experiments_of, fleet_parser
 from compare.report.provenance import OURS, installed
 from compare.robots.arm import ARM
 from compare.robots.scene_file import read_scenes
-
-PARTS = ["Tables", "Tolerance", "Examples"]
 
 POSITIONS = """
 
@@ -40,13 +38,6 @@ def test_help_has_every_experiment_and_option(arguments, expected, capsys, monke
     status, text, err = answered(arguments, capsys)
     assert (status, err) == (0, "") and all(part in text for part in expected)
     assert max(map(len, text.splitlines())) <= LINE_WIDTH
-
-
-@pytest.mark.parametrize("name", EXPERIMENTS)
-def test_the_help_of_an_experiment_has_its_parts_and_its_options(name, capsys):
-    status, text, _ = answered([name, "--help"], capsys)
-    assert status == 0 and text.startswith(f"usage: python -m compare {name} [options]\n")
-    assert [word for word in re.findall(r"^(\w+)[:,]", help_of(name), re.MULTILINE) if word in PARTS] == PARTS
 
 
 def test_the_version_is_that_of_a_report(capsys):
@@ -88,16 +79,8 @@ IN_SECONDS = "equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf
 
 def lines_to_run():
     """Those that no cluster and no earlier fleet is needed for; most of them take long."""
-    example = (
-        "all --mjcf tests/models/quadruped.xml --write reports/quadruped_reduced.xml --out reports/quadruped"
-    )
-    elsewhere = {
-        "",
-        "all",
-        "all --quick",
-        "all --out reports/example",
-        example,
-    }  # test_command_line runs these, or their like
+    example = "all --mjcf tests/models/quadruped.xml --write reports/quadruped_reduced.xml --out reports/quadruped"
+    elsewhere = {"", "all", "all --quick", "all --out reports/example", example}  # test_command_line runs their like
     for line in command_lines():
         if line not in elsewhere and not {"--dask", "--since", "--help"} & {*line.split()}:
             yield pytest.param(line, marks=[] if line in IN_SECONDS else pytest.mark.slow)

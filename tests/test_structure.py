@@ -25,11 +25,6 @@ LIBRARIES = {
 SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "quantities", "setup"))
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
-# parameters and fields that have a class of this project, or one of its engines' or libraries'
-OURS = {
-    "case", "drawn", "engine", "figure", "model", "one", "reading", "reference", "report", "result", "robot",
-    "section", "setup", "tree",
-}  # fmt: skip
 
 
 def dotted(path) -> str:
@@ -122,33 +117,7 @@ def test_the_diagram_shows_the_imports_of_all_folders():
     assert {a for a, b in reached if a == b} == {name for pair in FOR_DOCSTRINGS for name in pair}
 
 
-def test_ci_runs_the_commands_of_the_readme():
-    readme, script = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", ".ci/run"))
-    main_job, tests = re.findall(r"^(?:python3 -m venv|\.venv/bin/python).*$", readme, re.MULTILINE)[:2]
-    assert main_job.endswith("python -m compare all") and tests.endswith("python -m pytest")
-    assert tests in script and main_job + " --quick" in script
-
-
 def test_no_module_of_an_experiment_hides_one_of_its_functions():
     """Importing a submodule sets the package's attribute of that name."""
     functions = {field.name for field in fields(Functions)}
     assert not {path for path in FILES if path.stem in functions and path.parent.parent.name == "experiments"}
-
-
-def annotations(path):
-    for node in ast.walk(parsed(path)):
-        if isinstance(node, ast.arg) and node.annotation:
-            yield node.arg, node.annotation
-        elif isinstance(node, ast.AnnAssign):
-            yield ast.unparse(node.target), node.annotation
-
-
-def test_object_is_the_type_of_nothing_of_the_project():
-    """An import is never avoided by `object` where a class is meant; of a user's values any type is possible."""
-    untyped = set()
-    for path in FILES:
-        for name, annotation in annotations(path):
-            parts = {part.id for part in ast.walk(annotation) if isinstance(part, ast.Name)}
-            if "object" in parts and name in OURS:
-                untyped.add(f"{dotted(path)}: {name}")
-    assert not untyped

@@ -166,10 +166,3 @@ def test_a_time_near_another_has_as_many_digits_as_tell_them_apart():
     assert milliseconds(limit) == milliseconds(step) == "2 ms"
     assert (milliseconds(limit, step), milliseconds(step, limit)) == ("2.015 ms", "2 ms")
     assert milliseconds(2.2049e-3, step) == "2.2 ms"
-
-
-@pytest.mark.parametrize("values, largest", [
-    ([1.0, 3.0, 2.0], 3.0), ([1.0, np.nan], np.inf), ([np.nan, 1.0], np.inf), ([None, 1.0], 1.0), ([None], None), ([], None),
-])  # fmt: skip
-def test_the_largest_of_values_is_infinite_where_one_is_not_a_number(values, largest):
-    assert largest_known(values) == largest
