@@ -11,7 +11,6 @@ import numpy as np
 import own_equations
 import pytest
 from in_process import InProcess, Lines, answered
-from models import PATHS
 
 from compare.core.text import say
 from compare.engines.own import OwnError
@@ -58,14 +57,6 @@ def test_right_equations_agree_in_whatever_form(folder, asked, joints):
     assert not run.failed and all(section.result.checks for section in run.sections)
     quantities = {row.quantity for section in run.sections for row in section.result.rows}
     assert ("energy above the zero position's" in quantities) == ("energy" in run.robot.own)
-
-
-def test_the_tree_of_another_robot_agrees(folder):
-    text = "from models import PATHS\nfrom compare.engines.mujoco import read\n"
-    (folder / "trees.py").write_text(f"{text}tree = read(PATHS['pendulum_ball']).tree\n")
-    run = examined(folder, "trees.py:tree", ["kinematics", *STATIC], PATHS["pendulum_ball"])
-    assert not run.failed
-    assert {row.quantity for row in run.sections[0].result.rows} == {"x_b", "T_b", "B_b"}
 
 
 @pytest.mark.parametrize("asked, names, where, quantity", [

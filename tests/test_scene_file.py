@@ -119,19 +119,6 @@ def test_the_number_of_steps_of_a_run_is_limited(tmp_path, steps, accepted):
     assert scene.steps == steps
 
 
-def test_a_case_keeps_the_gravity_and_the_damping_of_the_file():
-    moon = parse(XML.replace("0 0 -9.81", "0.5 -0.3 -1.62"), ARM.tree)
-    sticky = parse(XML.replace('axis="1 0 0"/>', 'axis="1 0 0" damping="0.3"/>'), ARM.tree)
-    for case in ARM.cases:
-        gravity, damping = case.scene.gravity, case.scene.damping
-        of_moon = [0.5, -0.3, -1.62] if gravity else [0.0, 0.0, 0.0]
-        assert moon.of(case).model.opt.gravity.tolist() == of_moon
-        one, added = sticky.of(case), [0.3 * (name == "beta") for name in case.joints]
-        assert one.model.dof_damping[one.dofs].tolist() == [damping + more for more in added]
-        assert case.tree.gravity == (tmt.ARM.gravity if gravity else (0.0, 0.0, 0.0))
-        assert case.tree.damping == (damping,) * len(case.joints)
-
-
 def test_cases_that_differ_in_one_change_have_their_own_models():
     changes = [
         {}, {"gravity": False}, {"damping": 0.1}, {"damping": 0.1001}, {"locked": ("beta",)}, {"locked": ("gamma",)},

@@ -65,13 +65,6 @@ def test_a_step_whose_error_is_no_number_is_refused():
     assert motion.evaluations < 2.0 * evaluations
 
 
-def test_what_overflows_at_any_step_diverges():
-    motion = tmt.simulate(BENT, np.full(3, 1e200), Z, 0.1, 5, ADAPTIVE)
-    assert (
-        motion.ended.startswith("at t = 0 s") and "diverges" in motion.ended and np.isnan(motion.q[1:]).all()
-    )
-
-
 def test_its_evaluations_have_a_limit(monkeypatch):
     """That of a run: one that needs just as many goes on, one that needs one step more ends; the others do not."""
     starts = np.array([BENT, Z, -BENT])

@@ -14,8 +14,6 @@ from compare.engines.mujoco import read
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from tmt.compiled.evaluator import Evaluator
-from tmt.derivation import linearized
-from tmt.derivation.quantities import State
 from tmt.exact.many import exact_of_many
 
 CENTRAL = {1: 4 / 5, 2: -1 / 5, 3: 4 / 105, 4: -1 / 280}  # weights of the difference of order 8
@@ -104,24 +102,8 @@ def test_derivatives_are_the_limits_of_differences(make, rng):
         assert np.allclose(values, alone, rtol=1e-11, atol=1e-11)
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_rates_in_closed_form_are_those_of_dual_numbers_in_the_literal_form(seed, rng):
-    """Of chains and branches of every kind of joint, entry by entry in units of the largest of its row."""
-    tree = kinds(seed)
-    for q, qd, qdd in zip(*random_states(rng, tree, 3)):
-        given = {"q": q.tolist(), "qd": qd.tolist(), "qdd": qdd.tolist()}
-        found, expected = linearized.rates(tree, *given.values()), State(tree, given).force_rates
-        for values, right in zip(np.array(found), np.array(expected)):
-            assert np.abs(values - right).max() <= 1e-12 * np.abs(right).max() and np.abs(right).max() > 0.1
-
-
-LONE = (
-    "rk4",
-    "semi_implicit_euler",
-    "implicit",
-    "implicitfast",
-    "discrete",
-)  # which take other terms of a free body
+# which take other terms of a free body
+LONE = "rk4", "semi_implicit_euler", "implicit", "implicitfast", "discrete"
 
 
 @pytest.mark.parametrize("method, make", [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import tmt
-from compare.core.text import say, screen
+from compare.core.text import say
 from compare.engines import GRID, Method, Motion, Setting
 from compare.engines.outside.file import EngineError, TooLong
 from compare.experiments import speed
@@ -23,20 +23,9 @@ STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 def run_of(engine, method, error, steps=64, seconds=1e-3, **more) -> RunRow:
     """A run: diverged where the error is None."""
     errors = dict.fromkeys(("error", "worst_error", "early_error", "energy_error"), error)
-    about = {
-        "scene": "bent, free",
-        "engine": engine,
-        "method": method,
-        "scheme": SCHEMES.get(method, method),
-        "order": 4,
-    }
-    numbers = {
-        "dt": 5.0 / steps,
-        "steps": steps,
-        "timed_steps": steps,
-        "evaluations": 4 * steps,
-        "seconds": seconds,
-    }
+    about = {"scene": "bent, free", "engine": engine, "method": method, "scheme": SCHEMES.get(method, method), "order": 4}
+    numbers = {"dt": 5.0 / steps, "evaluations": 4 * steps, "seconds": seconds}
+    numbers |= dict.fromkeys(("steps", "timed_steps"), steps)
     return RunRow(**about | errors | numbers | {"ended": None if error else "diverged"} | more)
 
 
@@ -164,27 +153,9 @@ def test_the_cheapest_setting_of_each_engine_for_an_error():
     "error, target, reaches", [(1e-6, 1e-6, True), (1.01e-6, 1e-6, False), (None, 1.0, False)]
 )
 def test_a_run_reaches_an_error_that_is_not_smaller_than_its_own(error, target, reaches):
-    rows = [
-        run_of("tmt", "rk4", error),
-        run_of("tmt", "dopri8", 1e-9, seconds=None),
-    ]  # the latter is not timed
+    rows = [run_of("tmt", "rk4", error), run_of("tmt", "dopri8", 1e-9, seconds=None)]  # the latter is not timed
     assert (conclusions.cheapest(rows, target) is rows[0]) is reaches
     assert conclusions.cheapest(rows, target, engine="mujoco") is None
-
-
-def test_the_first_screen_has_the_cheapest_of_each_engine_and_says_what_is_extrapolated():
-    result = result_of(many_runs())
-    values = speed.uses(result)
-    first, _, head, *table, last = screen(result.finding("answer", uses=values))
-    assert [*values["cheapest"]] == ["SciPy", "TMT", "MuJoCo"] and "DOP853, tolerance 1e-07, 0.1 ms" in first
-    assert "about 320 ms" in first and "bent, free" in first
-    cells = {line.split()[0]: line.split("  ")[1:] for line in table}
-    assert [*cells] == ["SciPy", "TMT", "MuJoCo"] and head.split()[-3:] == ["1e-3", "1e-6", "1e-9"]
-    assert "RK4 80 ms" in table[2] and "RK4 ~320 ms" in table[2] and table[2].endswith("-") and "512" in last
-    whole = result_of([row for row in many_runs() if not row.extrapolated])
-    assert "extrapolated" not in " ".join(screen(whole.finding("answer", uses=speed.uses(whole))))
-    none = result_of([run_of("mujoco", "Euler", 0.1)])
-    assert "no setting" in say(none.finding("headline", uses=speed.uses(none)))
 
 
 class Slow:
@@ -200,10 +171,7 @@ class Slow:
         self.asked.append((method, setting.steps))
         if method in self.refused:
             raise self.refused[method]
-        states = (
-            np.tile(q, (GRID + 1, 1)),
-            np.tile(v + 1.0, (GRID + 1, 1)),
-        )  # it stays, and has an energy of motion
+        states = np.tile(q, (GRID + 1, 1)), np.tile(v + 1.0, (GRID + 1, 1))  # it stays, and has an energy of motion
         motion = Motion(np.linspace(0.0, 5.0, GRID + 1), *states, seconds_alone=self.seconds[setting.steps])
         return lambda: None, lambda _: motion
 
@@ -213,9 +181,8 @@ KNOWN = reference(HELD)
 
 
 def measured(engine, *methods, budget=np.inf):
-    settings = {
-        Method("drake", name, 4, name): [Setting(5.0, steps) for steps in (64, 128, 256)] for name in methods
-    }
+    of_each = [Setting(5.0, steps) for steps in (64, 128, 256)]
+    settings = {Method("drake", name, 4, name): of_each for name in methods}
     return runs.measure(HELD, {"drake": engine}, settings, KNOWN, budget)
 
 
@@ -244,10 +211,8 @@ def test_a_method_that_an_engine_refuses_is_a_row_and_an_engine_without_an_answe
 
 def test_compilation_is_the_sum_of_the_methods_of_an_engine():
     rows = [run_of("mjx", "RK4", 1e-3, compile_seconds=4.0), run_of("mjx", "RK4", 1e-4, compile_seconds=1e-5)]
-    rows += [
-        run_of("mjx", "Euler", 1e-3, compile_seconds=2.0),
-        run_of("mujoco", "RK4", 1e-3, compile_seconds=9e-3),
-    ]
+    of_each = ("mjx", "Euler", 2.0), ("mujoco", "RK4", 9e-3)
+    rows += [run_of(engine, method, 1e-3, compile_seconds=seconds) for engine, method, seconds in of_each]
     assert speed.compilation(rows) == {"MJX": 6.0}
 
 

@@ -96,24 +96,6 @@ def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_bent, 
     assert runs.scene_runs(BENT, engines, "small").floor == 1e-6
 
 
-@pytest.mark.slow
-def test_a_small_run_takes_every_path(engines, small):
-    result = small("speed")
-    ran, costs = [row for row in result.rows if row.why_not is None], result.tables["evaluations"]
-    assert all(row.seconds > 0.0 for row in ran) and all(row.ns_per_state > 0.0 for row in costs)
-    methods = {(method.engine, method.name) for method in settings.methods(engines, "full", BENT)}
-    assert {(row.engine, row.method) for row in ran} == {
-        of for of in methods if of[0] in ("mujoco", "tmt", "scipy")
-    }
-    assert {row.quantity for row in costs} == {"forward_dynamics"}
-    lost = [row for row in ran if row.ended]
-    assert {(row.error, row.worst_error, row.energy_error) for row in lost} == {(None, None, None)}
-    coarse = [row for row in ran if row.steps == 64 and row.method in ("rk4", "RK4")]
-    for scene, error in {"zero, free": 1.6, "bent, free": 0.27}.items():
-        errors = [row.worst_error for row in coarse if row.scene == scene]
-        assert errors == pytest.approx([error, error], rel=0.037)
-
-
 def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engines):
     result = untimed_speed(Setup.small(ARM, engines))
     assert len(result.checks) > 10 and all(check.passed for check in result.checks)
