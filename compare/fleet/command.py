@@ -120,7 +120,7 @@ def executor_of(options: argparse.Namespace) -> "Executor":
 def solution_of(reference: str | None) -> "Model | None":
     """The reference of a fleet, if it is a solution. Refused if that cannot be read."""
     from ..engines.mujoco import ModelError, read  # imports are slow
-    from ..process.parts import needed_by
+    from ..process.files import needed_by
     from ..run.reference import is_solution
     from .models import Model
 

@@ -19,7 +19,7 @@ from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 from ..core.errors import Refused, described
 from ..process import interrupt
-from ..process.workers import Beginning, WorkerEnded, Workers, kill_children
+from ..process.workers import WorkerEnded, Workers, kill_children
 from .cache import RESUME, program
 
 T = TypeVar("T")
@@ -70,8 +70,8 @@ class Pool:
         self.workers, self.limit, self.folder = workers, limit, folder or own_folder()
         self.memory = int(SHARE * (memory or memory_of_machine() / workers))
         os.environ |= ENVIRONMENT
-        beginning = Beginning(is_silent=True, memory=self.memory, folder=self.folder)
-        self.processes = Workers(workers, beginning, limit, RETRIES, is_fresh=True)
+        of_process = {"is_silent": True, "memory": self.memory, "folder": self.folder}
+        self.processes = Workers(workers, limit, RETRIES, is_fresh=True, **of_process)
 
     def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]":
         if hasattr(os, "fork"):

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from ..core.errors import Refused
 from ..core.words import in_one_line, readable
-from ..process.parts import elements_of, is_pipe, needed_by
+from ..process.files import elements_of, is_pipe, needed_by
 
 PART = "mujocoinclude"  # root element of a file that is no model by itself
 

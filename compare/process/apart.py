@@ -7,97 +7,84 @@ status cannot forge.
 import os
 import shutil
 import signal
-import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from math import inf
-from multiprocessing import connection, get_context, parent_process
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from pathlib import Path
 from typing import Any
 
 from ..core.errors import how_ended
 from . import interrupt, streams
+from .files import remove_empty
 
 ANSWER, ENDING = 1.0, 60.0  # s for a child to answer an interrupt, and then to write what is finished
 
 
 def in_child(run: Callable[[], int]) -> int:
     """The exit status of a run in a child; 2, with a line, if the child ends otherwise or does not answer."""
-    context = get_context("spawn")
+    context, is_interrupted = get_context("spawn"), False
     ours, theirs = context.Pipe()
     child = context.Process(target=as_child, args=(run, theirs))
+    told: dict[str, Any] = {"outcome": interrupt.Now.outcome}
     interrupt.shield()
     child.start()
-    interrupt.shield(False)
     theirs.close()
-    told: dict[str, Any] = {"outcome": interrupt.Now.outcome}
-    asked, until = 0, inf
-    while "end" not in told and time.monotonic() < until:
-        ready = connection.wait([ours, child.sentinel], interrupt.POLL)
-        try:
-            if ours in ready:
-                kind, what = ours.recv()
-                told[kind] = what
-            elif ready:
-                break
-        except (EOFError, OSError):
-            break
-        if interrupt.Now.asked > asked:
+    try:
+        interrupt.shield(False)
+        hear(ours, child, told, "end", inf)
+    except KeyboardInterrupt:
+        is_interrupted = True
+        with suppress(KeyboardInterrupt):
             child.terminate()  # it hears that as Ctrl-C
-            asked, until = interrupt.Now.asked, time.monotonic() + ANSWER
-        if "ending" in told and asked == 1:
-            until = time.monotonic() + ENDING
-            del told["ending"]
+            hear(ours, child, told, "ending", ANSWER)
+            hear(ours, child, told, "end", ENDING if "ending" in told else 0.0)
     if "end" in told:
         child.join(ANSWER)
-    end_group(child)
+    end_group(child.pid or 0)
+    child.kill()
+    child.join()
     if "end" in told:
         return int(told["end"])
     if "folder" in told:
-        folder, made = told["folder"]
-        clear(folder, made)
-    if asked:
-        streams.say_error(f"interrupted; {told['outcome']}")
-    else:
-        how = how_ended(child.exitcode or 0)
-        streams.say_error(
-            f"the run ended before its end, perhaps by your equations: {how}; {told['outcome']}"
-        )
+        unfinished, made = told["folder"]
+        shutil.rmtree(unfinished, ignore_errors=True)
+        remove_empty(made)
+    how = "interrupted"
+    if not is_interrupted:
+        how = f"the run ended before its end, perhaps by your equations: {how_ended(child.exitcode or 0)}"
+    streams.say_error(f"{how}; {told['outcome']}")
     return 2
 
 
-def end_group(child: BaseProcess) -> None:
-    with suppress(OSError, AttributeError):
-        os.killpg(child.pid or 0, signal.SIGKILL)
-    child.kill()
-    child.join()
+def hear(pipe: Connection, child: BaseProcess, told: dict[str, Any], kind: str, seconds: float) -> None:
+    """Add what a child tells, up to a message of this kind or the last one, for so long, while it is there."""
+    until = time.monotonic() + seconds
+    with suppress(EOFError, OSError):
+        while not told.keys() & {kind, "end"} and time.monotonic() < until:
+            is_there = child.is_alive()
+            if pipe.poll(interrupt.POLL):
+                name, what = pipe.recv()
+                told[name] = what
+            elif not is_there:
+                return
 
 
-def clear(folder: Path, made: Sequence[Path]) -> None:
-    """Delete the unfinished report of a run, and the folders that it made for it, if they are empty."""
-    shutil.rmtree(folder, ignore_errors=True)
-    with suppress(OSError):
-        for path in made:
-            path.rmdir()
-
-
-def as_child(run: Callable[[], int], parent: connection.Connection) -> None:
+def as_child(run: Callable[[], int], parent: Connection) -> None:
     if hasattr(os, "setpgrp"):
         os.setpgrp()
-    threading.Thread(target=end_with_parent, daemon=True).start()
+    interrupt.end_with_parent(end_group)
     interrupt.Now.parent = parent
     streams.prepare()
     interrupt.listen()
+    interrupt.shield(False)  # it has been started deaf
     interrupt.tell("end", interrupt.answered(run))
     interrupt.leave(0)
 
 
-def end_with_parent() -> None:
-    process = parent_process()
-    if process:
-        process.join()
-    with suppress(AttributeError):
-        os.killpg(0, signal.SIGKILL)
-    os._exit(1)
+def end_group(leader: int = 0) -> None:
+    """Kill a process group; 0: that of this process."""
+    with suppress(OSError, AttributeError):
+        os.killpg(leader, signal.SIGKILL)

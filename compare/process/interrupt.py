@@ -10,9 +10,9 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from multiprocessing import resource_tracker
+from multiprocessing import parent_process, resource_tracker
 from multiprocessing.connection import Connection
 
 from .streams import Stream, say_error
@@ -25,7 +25,6 @@ at_end = ExitStack()  # what ends and clears up a run; last first
 class Now:
     lock = threading.RLock()
     is_listening = False  # an interrupt raises no KeyboardInterrupt in the run
-    asked = 0  # interrupts so far
     is_interrupted = False
     is_settled = False  # an interrupt is too late
     outcome = "nothing was written"
@@ -34,21 +33,12 @@ class Now:
 
 
 def listen() -> None:
-    """From now on an interrupt is counted. Ignored signals (nohup, background) stay ignored."""
-    names = [name for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    numbers = [getattr(signal, name) for name in names]
-    numbers = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
-    for number in numbers:
-        signal.signal(number, hear)
+    """From now on the main thread has a KeyboardInterrupt. Ignored signals (nohup, background) stay ignored."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number and signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.default_int_handler)
     Now.is_listening = True
-    if Now.parent:
-        shield(False)  # it has been started deaf
-
-
-def hear(*_: object) -> None:
-    Now.asked += 1
-    if Now.is_interrupted:
-        raise KeyboardInterrupt  # a further one cuts off what the first has begun
 
 
 def shield(is_on: bool = True) -> None:
@@ -70,24 +60,22 @@ def answered(run: Callable[[], int]) -> int:
         except BaseException as error:
             status.set_exception(error)
 
-    threading.Thread(target=carry_out, daemon=True).start()
     told = ""
-    while True:
-        with suppress(TimeoutError):
-            return status.result(POLL)
-        name, seconds = waited_for()
-        if seconds > PATIENCE and name != told and not os.isatty(2):
-            say_error(f"waiting for {name}, {seconds:.0f} s")
-            told = name
-        if Now.asked:
-            with Now.lock:
-                Now.is_interrupted = not Now.is_settled
-            if Now.is_interrupted:
-                return end()
+    try:
+        threading.Thread(target=carry_out, daemon=True).start()
+        while not wait([status], POLL).done:
+            name, seconds = waited_for()
+            if seconds > PATIENCE and name != told and not os.isatty(2):
+                say_error(f"waiting for {name}, {seconds:.0f} s")
+                told = name
+    except KeyboardInterrupt:
+        with Now.lock:
+            Now.is_interrupted = not Now.is_settled
+    return end() if Now.is_interrupted else status.result()
 
 
 def end() -> int:
-    """Clear up after an interrupt; the exit status."""
+    """Clear up after an interrupt; a further one cuts that off. The exit status."""
     name, seconds = waited_for()
     where = f" while waiting for {name}, {seconds:.0f} s" if name else ""
     tell("ending")
@@ -153,6 +141,20 @@ def on_interrupt(outcome: str) -> None:
 def is_interrupt(error: BaseException) -> bool:
     """Whether an exception is Ctrl-C; else a user's own code raised it."""
     return isinstance(error, KeyboardInterrupt) and not Now.is_listening
+
+
+def end_with_parent(act: Callable[[], object] | None = None) -> None:
+    """From now on this process ends when its parent has, after a last act."""
+
+    def watch() -> None:
+        parent = parent_process()
+        if parent:
+            parent.join()
+        if act:
+            act()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def leave(status: int) -> None:

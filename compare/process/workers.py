@@ -5,15 +5,13 @@ import logging
 import os
 import shutil
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing import active_children, get_context, parent_process
+from multiprocessing import active_children, get_context
 from typing import Any, ParamSpec, TypeVar
 
 from pebble import ProcessExpired, ProcessPool
@@ -74,59 +72,48 @@ class WorkerEnded(RuntimeError):
         self.how = how
 
 
-@dataclass(frozen=True)
-class Beginning:
-    """What a process does before its first call. It ends with its parent, and then deletes the folder."""
+def begin(
+    environment: tuple[tuple[str, str], ...] = (), is_silent: bool = False, memory: int | None = None,
+    folder: str | None = None,
+) -> None:  # fmt: skip
+    """What a process does before its first call. It ends with its parent, and then deletes the folder.
 
-    environment: tuple[tuple[str, str], ...] = ()
-    is_silent: bool = False  # what it prints is lost, that of its libraries of C too
-    memory: int | None = None  # limit, bytes
-    folder: str | None = None
-
-    def begin(self) -> None:
-        logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
-        threading.Thread(target=self.end_with_parent, daemon=True).start()
-        os.environ.update(self.environment)
-        for stream in (1, 2) if self.is_silent else ():
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
-        if resource and self.memory:
-            with suppress(OSError, ValueError):
-                resource.setrlimit(resource.RLIMIT_DATA, (self.memory, self.memory))
-
-    def end_with_parent(self) -> None:
-        parent = parent_process()
-        if parent is not None:
-            parent.join()
-        if self.folder:
-            shutil.rmtree(self.folder, ignore_errors=True)
-        os._exit(1)
+    is_silent: what it prints is lost, that of its libraries of C too. memory: limit, bytes.
+    """
+    logging.getLogger("tmt").setLevel(logging.ERROR)  # the main process has the same warnings
+    interrupt.end_with_parent(partial(shutil.rmtree, folder, ignore_errors=True) if folder else None)
+    os.environ.update(environment)
+    for stream in (1, 2) if is_silent else ():
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
+    if resource and memory:
+        with suppress(OSError, ValueError):
+            resource.setrlimit(resource.RLIMIT_DATA, (memory, memory))
 
 
-@dataclass(eq=False)
 class Workers:
-    """Processes that make calls at the same time; one that ends, or takes too long, is replaced."""
+    """Processes that make calls at the same time; one that ends, or takes too long, is replaced.
 
-    count: int
-    beginning: Beginning
-    limit: float | None = None  # s for a call
-    retries: int = 0  # of a call whose process is killed by SIGKILL (no memory, an operator)
-    is_fresh: bool = False  # each call has a process of its own
-    pool: ProcessPool = field(init=False)
-    pending: set["Future[Any]"] = field(default_factory=set)
+    limit: s for a call. retries: of a call whose process is killed by SIGKILL (no memory, an operator).
+    is_fresh: each call has a process of its own. beginning: see `begin`.
+    """
 
-    def __post_init__(self) -> None:
-        self.pool = self.new_pool()
+    def __init__(
+        self, count: int, limit: float | None = None, retries: int = 0, is_fresh: bool = False,
+        **beginning: Any,
+    ):  # fmt: skip
+        self.limit, self.retries = limit, retries
+        is_forked = hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH
+        context = get_context("forkserver" if is_fresh and is_forked else "spawn")
+        first = partial(begin, **beginning)
+        # its processes start with its first call
+        self.new_pool = partial(ProcessPool, count, int(is_fresh), first, context=context)
+        self.pool: ProcessPool = self.new_pool()
+        self.pending: set[Future[Any]] = set()
         interrupt.at_end.callback(self.close)
 
     @property
     def clock(self) -> Clock:
         return Current.clock
-
-    def new_pool(self) -> ProcessPool:
-        """A pool whose processes start with its first call."""
-        is_forked = hasattr(os, "fork") and len(os.fsencode(tempfile.gettempdir())) <= LONGEST_PATH
-        context = get_context("forkserver" if self.is_fresh and is_forked else "spawn")
-        return ProcessPool(self.count, int(self.is_fresh), self.beginning.begin, context=context)
 
     def submit(self, function: Callable[P, T], /, *arguments: P.args, **named: P.kwargs) -> "Future[T]":
         """The future of a call; it raises what the function raises, TimeoutError or WorkerEnded."""
@@ -188,7 +175,7 @@ def kill_children() -> None:
 @contextmanager
 def start_workers() -> Iterator[Workers]:
     """The two workers of a run, for figures and scenes; its clock begins."""
-    Current.clock, workers = Clock(), Workers(2, Beginning())
+    Current.clock, workers = Clock(), Workers(2)
     try:
         yield workers
     finally:

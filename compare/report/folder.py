@@ -12,6 +12,7 @@ from types import ModuleType
 
 from ..core.errors import Refused
 from ..process import interrupt
+from ..process.files import remove_empty
 
 fcntl: ModuleType | None
 try:
@@ -33,7 +34,7 @@ def new_report(out: str | Path, shown: str | Path = "") -> Iterator[Path]:
     out, shown = Path(out), Path(shown or out)
     made = [path for path in (out, *out.parents) if not os.path.lexists(path)]  # the innermost first
     with ExitStack() as stack:
-        stack.callback(remove, made)
+        stack.callback(remove_empty, made)
         try:
             out.mkdir(parents=True, exist_ok=True)
             clear_away(out)
@@ -82,13 +83,6 @@ def exchange(work: Path, out: Path, shown: Path) -> None:
             raise Refused(f"cannot replace the report in {shown}: {error.strerror}{state}") from None
         back.pop_all()
         interrupt.settle()
-
-
-def remove(made: Sequence[Path]) -> None:
-    """Delete the folders that a run has made, if they are empty."""
-    with suppress(OSError):
-        for path in made:
-            path.rmdir()
 
 
 def clear_away(out: Path) -> None:

@@ -18,7 +18,7 @@ from ..engines.mujoco.parameters import of_source, of_welded, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import aside, own_object, raised_in
 from ..experiments.setup import Request
-from ..process.writing import assets_of, why_not
+from ..process.files import assets_of, why_not
 from ..report.folder import OWN
 from ..robots import Robot
 from ..robots.arm import ARM

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from compare.process.workers import Beginning, WorkerEnded, Workers, start_workers
+from compare.process.workers import WorkerEnded, Workers, start_workers
 
 LONG = 0.1  # s
 SOON = 60.0  # s, far more than anything here takes
@@ -43,7 +43,7 @@ def test_what_a_worker_does_is_for_the_task_that_asked():
 
 
 def test_what_other_workers_do_counts_for_the_task_of_the_run():
-    with start_workers() as workers, closing(Workers(1, Beginning())) as engine:
+    with start_workers() as workers, closing(Workers(1)) as engine:
         with workers.clock.of("engines"):
             engine.submit(busy, 2 * LONG).result(SOON)
         assert workers.clock.seconds_of("engines") >= 2 * LONG
@@ -64,7 +64,7 @@ kept: list[bytearray] = []
 
 @pytest.mark.skipif(not hasattr(CDLL(None) if os.name == "posix" else None, "malloc_trim"), reason="no glibc")
 def test_what_a_call_needs_no_more_is_given_back():
-    with closing(Workers(1, Beginning())) as workers:
+    with closing(Workers(1)) as workers:
         before = workers.submit(resident).result(SOON)
         workers.submit(fill_memory).result(SOON)
         assert workers.submit(resident).result(SOON) - before < 70e6
@@ -79,7 +79,7 @@ ENDS = {"killed by SIGKILL": (signal.raise_signal, signal.SIGKILL), "exit status
 
 @pytest.mark.parametrize("is_fresh", [False, True])
 def test_a_process_that_ends_or_takes_too_long_is_replaced(is_fresh):
-    with closing(Workers(1, Beginning(), limit=2.0, is_fresh=is_fresh)) as workers:
+    with closing(Workers(1, limit=2.0, is_fresh=is_fresh)) as workers:
         first = workers.submit(os.getpid)
         assert (workers.submit(os.getpid).result(SOON) == first.result(SOON)) is not is_fresh
         with pytest.raises(TimeoutError, match=r"2\.0"):
@@ -93,7 +93,7 @@ def test_a_process_that_ends_or_takes_too_long_is_replaced(is_fresh):
 
 
 def test_a_process_that_is_killed_while_it_is_idle_is_replaced():
-    with closing(Workers(1, Beginning())) as workers:
+    with closing(Workers(1)) as workers:
         os.kill(workers.submit(os.getpid).result(SOON), signal.SIGKILL)
         time.sleep(5 * LONG)
         assert workers.submit(abs, -4).result(SOON) == 4

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from tmt.export.parameters import PAYLOAD, SIZES, Parameters
 from tmt.model.tree import Tree
 
-from ...process.writing import assets_of
+from ...process.files import assets_of
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Use, joints
 from .names import bit, element_name, kind_of, parts_of

@@ -19,7 +19,7 @@ from xml.etree import ElementTree
 import mujoco
 import numpy as np
 
-from ...process.parts import is_pipe, named_by, needed_by
+from ...process.files import is_pipe, named_by, needed_by
 from . import locked
 from .locked import FROM_GEOMS, Positions, compiled, gives_inertia
 from .names import FROM_4, moving

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ...core.words import listed
-from ...process.workers import Beginning, WorkerEnded, Workers
+from ...process.workers import WorkerEnded, Workers
 from ...robots.case import Case
 from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Setting
 from ..mujoco.source import is_urdf
@@ -120,4 +120,4 @@ class OutsideDynamics(OneByOne):
 @cache
 def process(name: str) -> Workers:
     """The process of an engine."""
-    return Workers(1, Beginning(RECORDS[name].environment, is_silent=True), answers.LIMIT)
+    return Workers(1, answers.LIMIT, environment=RECORDS[name].environment, is_silent=True)

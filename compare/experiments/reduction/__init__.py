@@ -22,7 +22,7 @@ from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit
 from ...judge.scale import EPS, FACTOR
-from ...process.writing import assets_of, draft_of, move
+from ...process.files import assets_of, draft_of, move
 from ...robots import Robot
 from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
