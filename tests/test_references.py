@@ -94,8 +94,7 @@ def counts(monkeypatch):
 
 
 @pytest.mark.parametrize("words", [
-    ["parameters", "--mjcf", str(PATHS["gripper"])], ["stability", "--mjcf", str(PATHS["free_body"])],
-    ["kinematics", "--mjcf", str(ARM.mjcf), "--reference", "arm"],
+    ["parameters", "--mjcf", str(PATHS["gripper"])], ["kinematics", "--mjcf", str(ARM.mjcf), "--reference", "arm"],
 ])  # fmt: skip
 def test_a_file_is_parsed_and_compiled_once(inside, tmp_path, counts, words):
     assert main([*words, "--quick", "--out", str(tmp_path / "out")]) == 0

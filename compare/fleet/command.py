@@ -6,6 +6,7 @@ import shlex
 import time
 from collections.abc import Sequence
 from contextlib import closing
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,9 +22,7 @@ from ..process.streams import PROGRAM
 from ..report.terminal import Terminal
 
 if TYPE_CHECKING:
-    from .executors import Executor
     from .models import Model
-    from .table import FileRow
 
 
 def fleet_reference(text: str) -> str:
@@ -86,6 +85,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     """Compare all files and write the table; the exit status."""
     started = time.perf_counter()
     from .cache import locked  # imports are slow
+    from .executors import Cluster, Pool
     from .models import found_models
     from .run import Run
     from .table import write_table
@@ -96,25 +96,19 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     solution = solution_of(options.reference)
     path = os.path.abspath(solution.path) if solution else ""
     file_options = FleetOptions(names, not options.full, options.reference, path)
-    with locked(out), closing(executor_of(options)) as executor:
+    make = partial(Cluster, options.dask) if options.dask else partial(Pool, options.workers or cores())
+    with locked(out), closing(make(options.limit)) as executor:
         run = Run(models, file_options, executor, out, solution)
         terminal.how_far = run.progress
         with terminal.progress(""):
-            run.carry_out(lambda rows: say_rows(terminal, rows))
+            for row in run.carried_out():
+                terminal.say(block("fleet", "line", row=row), "red" if row.is_bad else "")
         summary = write_table(out, run.rows, left_out, command)
     terminal.say()
     terminal.say_lines(summary, "bold green" if run.is_good else "bold red")
     page, seconds = in_one_line(os.path.join(options.out, "index.html")), time.perf_counter() - started
     terminal.say(f"Fleet: {page} ({seconds:.1f} s)")
     return 0 if run.is_good else 1
-
-
-def executor_of(options: argparse.Namespace) -> "Executor":
-    from .executors import Cluster, Pool  # imports are slow
-
-    if options.dask:
-        return Cluster(options.dask, options.limit)
-    return Pool(options.workers or cores(), options.limit)
 
 
 def solution_of(reference: str | None) -> "Model | None":
@@ -132,8 +126,3 @@ def solution_of(reference: str | None) -> "Model | None":
     except ModelError as error:
         raise Refused(f"--reference: {error}") from None
     return Model(path, needed_by(path))
-
-
-def say_rows(terminal: Terminal, rows: Sequence["FileRow"]) -> None:
-    for row in rows:
-        terminal.say(block("fleet", "line", row=row), "red" if row.is_bad else "")

@@ -41,8 +41,11 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     files: dict[str, tuple[Path, bool]] = {}  # by the real path: the same file may be found more than once
     for path, is_named in sorted(paths_of(words), key=lambda pair: (not pair[1], pair[0].is_symlink())):
         files.setdefault(os.path.realpath(path), (path, is_named))
-    paths = {file: path for file, (path, is_named) in files.items() if is_named or not is_part(path)}
-    models = {file: Model(path, needed_by(path)) for file, path in paths.items()}
+    models = {}
+    for file, (path, is_named) in files.items():
+        root = next(elements_of(path), None)
+        if is_named or root is None or root.tag != PART:
+            models[file] = Model(path, needed_by(path))
     left_out = []
     users = {os.path.realpath(part): model.shown for model in models.values() for part in model.parts[1:]}
     for file, (path, is_named) in files.items():
@@ -54,11 +57,6 @@ def found_models(words: Sequence[str]) -> tuple[list[Model], list[tuple[str, str
     if not models:
         raise Refused(f"no MJCF or URDF file in {', '.join(map(in_one_line, words))}")
     return sorted(models.values(), key=lambda model: model.shown), sorted(left_out)
-
-
-def is_part(path: Path) -> bool:
-    root = next(elements_of(path), None)
-    return root is not None and root.tag == PART
 
 
 def paths_of(words: Iterable[str]) -> Iterator[tuple[Path, bool]]:

@@ -3,7 +3,7 @@
 import hashlib
 import os
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -17,8 +17,6 @@ from .table import BROKE, REFUSED, FileRow, row_of_data
 from .task import FleetOptions, compare_file
 
 POLLING = 0.3  # s between two questions whether somebody is left to answer
-
-
 Answer = Future[Outcome[FileRow]]
 
 
@@ -29,30 +27,30 @@ class Run:
     executor: Executor
     out: Path
     solution: Model | None = None  # with which all are compared
-    rows: list[FileRow] = field(default_factory=list)  # after carry_out one for each model
+    rows: list[FileRow] = field(default_factory=list)  # in the end one for each model
     first: dict[object, Model] = field(default_factory=dict)  # by the content of a model and its parts
     copies: list[tuple[Model, Model]] = field(default_factory=list)  # and the first model of the same content
     under_way: dict[Answer, tuple[Model, str]] = field(default_factory=dict)  # and the keys of their reports
     done: SimpleQueue[Answer] = field(default_factory=SimpleQueue)
 
-    def carry_out(self, say: Callable[[list[FileRow]], object]) -> None:
-        """Run to the end, copies last. say: called with new rows."""
+    def carried_out(self) -> Iterator[FileRow]:
+        """Run to the end; each row as it comes, copies last."""
         for model in self.models:
             self.start(model)
-        say(self.rows)
+        yield from self.rows
         while self.under_way:
             try:
                 self.receive(self.done.get(timeout=POLLING))
             except Empty:
                 self.executor.check()
             else:
-                say(self.rows[-1:])
+                yield self.rows[-1]
         rows = {row.file: row for row in self.rows}
         for model, first in self.copies:
             row = replace(rows[first.shown], file=model.shown, same_as=first.shown, seconds=0.0)
             row.reason = block("fleet", "copy", file=first.shown, reason=row.reason)
             self.rows.append(row)
-            say([row])
+            yield row
 
     def start(self, model: Model) -> None:
         """Submit a file, unless it is not readable, a copy, or its report is up to date."""

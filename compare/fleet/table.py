@@ -15,7 +15,7 @@ from ..core.text import block, environment, say
 from ..report import files
 from ..report.document import joined, page_of
 from ..report.provenance import OURS, commit, installed
-from ..report.verdict import Report, Section, failures, worst
+from ..report.verdict import Report, failures, worst
 from ..run.reference import Reference
 from ..stability.answer import worst_step
 from .cache import write_whole
@@ -113,13 +113,8 @@ def judge(row: FileRow, report: Report, reference: Reference) -> None:
         reasons.append(block("fleet", "unfinished", reasons=unfinished))
     row.reason = "; ".join(filter(None, (*reasons, reference.matched, *reference.otherwise)))
     row.worst_ratio = None if top is None else top.over_tolerance
-    row.stable_at_file_dt, row.limit = own_step(sections)
-
-
-def own_step(sections: Sequence[Section]) -> tuple[bool | None, float | None]:
-    """Whether the step in use is stable at every posture, None if unknown; the smallest limit that was found, s."""
-    rows = [row for section in sections for row in section.result.tables.get("step_limits", ())]
-    return worst_step(rows)
+    steps = [row for section in sections for row in section.result.tables.get("step_limits", ())]
+    row.stable_at_file_dt, row.limit = worst_step(steps)
 
 
 def write_table(out: Path, rows: Sequence[FileRow], left_out: LeftOut, command: str) -> list[str]:

@@ -57,10 +57,11 @@ class Document:
 
     def text(self) -> str:
         """The whole document."""
-        report = self.report
+        report, robot = self.report, self.report.robot
         lines = report.verdict.split("\n")
         parts = [self.template.head(self.title, report.first_lines, lines, report.top, report.passed)]
-        parts += [self.first_screen(), self.introduction()]
+        introduction = self.template.introduction(robot, robot.described or robot.name, joints_of(robot))
+        parts += [self.first_screen(), " ".join(introduction.split())]
         if report.causes:
             parts.append(self.template.causes(tables.of_causes(report.causes)))
         if self.answers is not None:
@@ -105,11 +106,6 @@ class Document:
             without_caption = figure._replace(caption="")
             pictures.append(Picture(without_caption, section.name, section.title, figure.caption, True))
         return sorted(pictures, key=lambda picture: not picture.fails)
-
-    def introduction(self) -> str:
-        robot = self.report.robot
-        text = self.template.introduction(robot, robot.described or robot.name, joints_of(robot))
-        return " ".join(text.split())
 
     def section(self, section: Section) -> str:
         not_judged = [check for check in section.result.checks if not check.judged]

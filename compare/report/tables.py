@@ -55,11 +55,8 @@ def of_checks(checks: Sequence[Check], columns: Sequence[str] = CHECK) -> pd.Dat
 
 
 def of_origin(origin: Mapping[str, Any]) -> pd.DataFrame:
-    rows = [[IN_WORDS.get(name, name), in_one_cell(value)] for name, value in origin.items()]
+    rows = []
+    for name, value in origin.items():
+        parts = [f"{key} {part}" for key, part in value.items()] if isinstance(value, dict) else [str(value)]
+        rows.append([IN_WORDS.get(name, name), ", ".join(parts)])
     return pd.DataFrame(rows, columns=["what", "value"])
-
-
-def in_one_cell(value: Any) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {part}" for name, part in value.items())
-    return str(value)

@@ -4,7 +4,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from textwrap import TextWrapper
 from typing import IO, cast
@@ -84,12 +84,13 @@ class Terminal:
         for part in parts:
             text = text.removeprefix(f"{part}: ")
         name, seconds = interrupt.waited_for()
-        text, seconds = (
-            (f"waiting for {name}", seconds) if seconds > LONG else (text, time.monotonic() - self.since)
-        )
+        if seconds > LONG:
+            text = f"waiting for {name}"
+        else:
+            seconds = time.monotonic() - self.since
         for_long = f", {seconds:.0f} s" if seconds > LONG else ""
         room = self.screen.width - 6 - len(for_long)  # the spinner, and what a terminal shows of Ctrl-C
-        line = joined(parts, text)
+        line = ": ".join(filter(None, (", ".join(parts), text)))
         return (line if len(line) <= room else line[: room - 3] + "...") + for_long
 
     def __rich__(self) -> Text:
@@ -98,7 +99,3 @@ class Terminal:
 
 def console(stream: Stream) -> Console:
     return Console(file=cast("IO[str]", stream), force_terminal=stream.isatty(), width=80, height=25)
-
-
-def joined(parts: Sequence[str], text: str) -> str:
-    return ": ".join(filter(None, (", ".join(parts), text)))

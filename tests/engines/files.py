@@ -1,4 +1,4 @@
-"""Small MJCF, a case of any tree, and the comparison of both engines: for engines/test_mujoco_*.py."""
+"""Small MJCF, a case of any tree, and comparisons with tmt and exact values: for the tests of this folder."""
 
 import struct
 from types import SimpleNamespace
@@ -7,7 +7,11 @@ import numpy as np
 from trees import random_state
 
 import tmt
+from compare.engines import RECORDS
+from compare.judge.entries import Entries
+from compare.judge.scale import FACTOR
 from compare.robots.coordinates import Coordinates
+from compare.robots.states import Sample
 
 EPS = np.finfo(float).eps
 
@@ -66,3 +70,17 @@ def assert_the_same(dynamics, tree, rng, states=3):
         same(dynamics.potential_energy(q), tmt.potential_energy(q, tree), energy)
         same(dynamics.energy(q, v), tmt.energy(q, v, tree), energy)
         same([*dynamics.other_forces(q, v).values()], 0.0, force)
+
+
+def assert_exact(engine, of, robot, count=5):
+    """M, h and accelerations of an outside engine are the exact ones; float32 is asked at numbers that it has."""
+    rng, precision, bound = np.random.default_rng(3), RECORDS[engine].precision, FACTOR * RECORDS[engine].eps
+    q = robot.coordinates.random(rng, count, robot.ranges)
+    v, tau = rng.uniform(-2.0, 2.0, (2, count, robot.coordinates.nv))
+    q, v, tau = (values.astype(precision).astype(float) for values in (q, v, tau))
+    sample, scales = Sample(robot.tree, "", q, v, tau, count), Entries(robot.tree, q, v)
+    assert (sample.exact("mass_matrix").distance(of.mass_matrix(q)) <= bound * scales.mass_matrix).all()
+    assert (sample.exact("bias").distance(of.bias(q, v)) <= bound * scales.bias).all()
+    exact = sample.exact("acceleration")
+    size = scales.acceleration(scales.force(tau), exact.high)
+    assert (exact.distance(of.acceleration(q, v, tau)) <= bound * size).all()

@@ -4,14 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from files import assert_exact
 
 import tmt
 from compare.engines import RECORDS, Setting
 from compare.engines.outside import Outside
 from compare.engines.outside.file import EngineError
-from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
-from compare.robots.states import Sample
 from compare.run.reference import compared_with
 
 ROOT = Path(__file__).parents[2]
@@ -67,19 +66,8 @@ def dynamics_or_skip(engine, model, folder=None):
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda path: path.stem)
 def test_a_robot_against_the_exact_values(engine, robot):
-    """Of doubles; a float32 engine is asked at numbers that float32 has, and its own numbers of the model are rounded."""
     of, robot = dynamics_or_skip(engine, robot)
-    precision, rng = RECORDS[engine].precision, np.random.default_rng(3)
-    q = robot.coordinates.random(rng, 5, robot.ranges)
-    v, tau = rng.uniform(-2.0, 2.0, (2, 5, robot.coordinates.nv))
-    q, v, tau = (values.astype(precision).astype(float) for values in (q, v, tau))
-    sample, scales = Sample(robot.tree, "", q, v, tau, 5), Entries(robot.tree, q, v)
-    bound = FACTOR * RECORDS[engine].eps
-    assert (sample.exact("mass_matrix").distance(of.mass_matrix(q)) <= bound * scales.mass_matrix).all()
-    assert (sample.exact("bias").distance(of.bias(q, v)) <= bound * scales.bias).all()
-    exact = sample.exact("acceleration")
-    size = scales.acceleration(scales.force(tau), exact.high)
-    assert (exact.distance(of.acceleration(q, v, tau)) <= bound * size).all()
+    assert_exact(engine, of, robot)
 
 
 @pytest.mark.parametrize("damping", ["0", "0.4"])

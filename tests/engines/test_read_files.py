@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
+from files import assert_exact
 
 import tmt
-from compare.engines import RECORDS, Setting
+from compare.engines import Setting
 from compare.engines.outside import Outside
 from compare.engines.outside.file import OtherNames, Unread
-from compare.judge.entries import Entries
-from compare.judge.scale import FACTOR
-from compare.robots.states import Sample
 from compare.run.reference import compared_with
 
 INSTALLED = [name for name in ("drake", "pinocchio", "newton") if not Outside(name).unavailable()]
@@ -37,18 +35,9 @@ def test_a_urdf_is_one_by_its_text_whatever_its_name(engine, name, floating, tmp
     """Its base is fixed, or free by --floating: M, h and accelerations are the exact ones."""
     robot = robot_of(tmp_path / name, URDF, floating)
     assert robot.coordinates.nv == (9 if floating else 3)
-    of, rng = Outside(engine).of(robot.case()), np.random.default_rng(4)
-    q = robot.coordinates.random(rng, 3)
-    v, tau = rng.uniform(-2.0, 2.0, (2, 3, robot.coordinates.nv))
-    q, v, tau = (values.astype(RECORDS[engine].precision).astype(float) for values in (q, v, tau))
-    sample, scales = Sample(robot.tree, "", q, v, tau, 3), Entries(robot.tree, q, v)
+    of = Outside(engine).of(robot.case())
     assert not of.reading.differing
-    bound = FACTOR * RECORDS[engine].eps
-    assert (sample.exact("mass_matrix").distance(of.mass_matrix(q)) <= bound * scales.mass_matrix).all()
-    assert (sample.exact("bias").distance(of.bias(q, v)) <= bound * scales.bias).all()
-    exact = sample.exact("acceleration")
-    size = scales.acceleration(scales.force(tau), exact.high)
-    assert (exact.distance(of.acceleration(q, v, tau)) <= bound * size).all()
+    assert_exact(engine, of, robot, 3)
 
 
 @pytest.mark.skipif("drake" not in INSTALLED, reason="Drake is not installed")

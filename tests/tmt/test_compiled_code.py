@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from trees import random_state, random_states, small_tree
 
 import tmt
-from tmt import literal
-from tmt.compiled import Evaluator, forms, runner, runs, straight
+from tmt.compiled import forms, runner, runs, straight
 from tmt.compiled.ir import POINTER, Code, module
 from tmt.compiled.machine import Library
 from tmt.compiled.runner import Runner
@@ -24,23 +23,6 @@ from tmt.methods import METHODS, one_step
 
 EPS = np.finfo(float).eps
 SMALL = small_tree()
-COUNT = 19  # two blocks and a rest, in any register
-
-
-def rows_of(compiled, states, wide=False):
-    out = np.full((len(states[0]), compiled.size), np.nan)
-    assert compiled.fill(wide, out, *states)
-    return out
-
-
-def test_states_side_by_side_have_the_bits_of_each_alone(rng):
-    states, compiled = random_states(rng, SMALL, COUNT), Evaluator(SMALL, "acceleration")
-    wanted, found = literal.acceleration(*states, SMALL), rows_of(compiled, states)
-    assert np.abs(found - wanted).max() <= 1e5 * EPS * np.abs(wanted).max() and compiled.operations > 0
-    for count in (*range(10), 17, COUNT):
-        some = [rows[:count] for rows in states]
-        assert np.array_equal(rows_of(compiled, some, wide=True), found[:count])
-        assert np.array_equal(compiled.of_rows(*some), found[:count])
 
 
 def compiled(traced):
