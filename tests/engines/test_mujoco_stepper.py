@@ -57,9 +57,8 @@ def test_runs_are_those_of_mj_step_bit_by_bit_in_one_roll_in_two_and_watched(nam
     second = stepper.roll(first.states, 37)
     assert np.array_equal(np.hstack([whole.q[0], whole.v[0]]), exact) and not np.array_equal(*whole.q)
     assert np.array_equal(np.concatenate([first.v, second.v], axis=1), whole.v)
-    assert np.array_equal(second.states, whole.states) and np.array_equal(
-        whole.states[0], state_of(model, data)
-    )
+    assert np.array_equal(second.states, whole.states)
+    assert np.array_equal(whole.states[0], state_of(model, data))
     watched = [np.r_[d.qpos, d.qvel] for d in stepper.watch(start, 60)]
     assert np.array_equal(watched, exact) and whole.ended.tolist() == [60, 60]
 
@@ -85,9 +84,7 @@ def test_inputs_of_a_roll_are_those_of_a_program_in_plain_steps():
 
 
 def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():
-    text = HINGE.format(
-        '<general joint="j" biastype="affine" biasprm="0 1e6 0"/>', '<key name="k" qpos="1"/>'
-    )
+    text = HINGE.format('<general joint="j" biastype="affine" biasprm="0 1e6 0"/>', '<key name="k" qpos="1"/>')
     stepper = Stepper(mujoco.MjModel.from_xml_string(text), 1.0, "Euler")
     start, speed, count = stepper.start("k", controls=[0.0]), 0.0, 0
     q = 1.0
@@ -103,9 +100,8 @@ def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():
 
 def test_a_warning_of_another_kind_does_not_end_a_run():
     """Of 300 contacts in too small a memory MuJoCo leaves some out, warns, and goes on; its rollout does not."""
-    geoms = "".join(
-        f'<geom size="0.1" pos="0 0 {0.001 * k}" contype="1" conaffinity="2"/>' for k in range(30)
-    )
+    ball = '<geom size="0.1" pos="0 0 {}" contype="1" conaffinity="2"/>'
+    geoms = "".join(ball.format(0.001 * k) for k in range(30))
     floor = '<geom type="plane" size="1 1 1" contype="2" conaffinity="1"/>' * 10
     text = f"""<mujoco><size memory="100K"/><worldbody>{floor}<body pos="0 0 0.05"><freejoint/>{geoms}</body>
       </worldbody></mujoco>"""
@@ -123,11 +119,8 @@ def test_a_warning_of_another_kind_does_not_end_a_run():
 def test_a_step_has_the_derivative_of_the_closed_form(integrator, by):
     """One hinge of 1 kg m2 on a servo: qdd = k (u - q) - c qd + tau; Euler's step, and Taylor's to order 4."""
     k, c, dt = 30.0, 2.0, 0.02
-    stepper = Stepper(
-        mujoco.MjModel.from_xml_string(HINGE.format(f'<position joint="j" kp="{k}" kv="{c}"/>', "")),
-        dt,
-        integrator,
-    )
+    servo = mujoco.MjModel.from_xml_string(HINGE.format(f'<position joint="j" kp="{k}" kv="{c}"/>', ""))
+    stepper = Stepper(servo, dt, integrator)
     F, G = np.array([[0.0, 1.0], [-k, -c]]), np.array([[0.0], [k if by == "ctrl" else 1.0]])
     terms = [np.eye(2), dt * F, dt**2 / 2 * F @ F, dt**3 / 6 * F @ F @ F, dt**4 / 24 * F @ F @ F @ F]
     A, integral = sum(terms), dt * (np.eye(2) + dt / 2 * F + dt**2 / 6 * F @ F + dt**3 / 24 * F @ F @ F)
@@ -191,12 +184,7 @@ STARTS = {  # actuators, what the keyframe states; the control and the activatio
     "a filter": (SERVO.format('timeconst="0.1"'), "", 0.4, 0.4),
     "a filter that is stated": (SERVO.format('timeconst="0.1"'), 'ctrl="0.7" act="0.2"', 0.7, 0.2),
     "an integrator": ('<intvelocity joint="j" kp="9" actrange="-1 1"/>', "", 0.0, 0.4),
-    "an integrator that is stated": (
-        '<intvelocity joint="j" kp="9" actrange="-1 1"/>',
-        'act="0.1"',
-        0.0,
-        0.1,
-    ),
+    "an integrator that is stated": ('<intvelocity joint="j" kp="9" actrange="-1 1"/>', 'act="0.1"', 0.0, 0.1),
     "a motor": ('<motor joint="j"/>', "", 0.0, None),
     "a velocity servo": ('<velocity joint="j" kv="2"/>', "", 0.0, None),
     "a muscle": ('<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/>', "", 0.0, 0.0),
@@ -206,9 +194,8 @@ STARTS = {  # actuators, what the keyframe states; the control and the activatio
 @pytest.mark.parametrize("kind", STARTS)
 def test_a_start_has_the_controls_of_its_keyframe_else_servos_hold_the_posture(kind):
     actuators, stated, control, activation = STARTS[kind]
-    model = mujoco.MjModel.from_xml_string(
-        HINGE.format(actuators.replace("{}", ""), f'<key name="k" qpos="0.4" qvel="2" {stated}/>')
-    )
+    key = f'<key name="k" qpos="0.4" qvel="2" {stated}/>'
+    model = mujoco.MjModel.from_xml_string(HINGE.format(actuators.replace("{}", ""), key))
     stepper = Stepper(model, 0.01, "Euler")
     for start in (stepper.start("k"), *([] if stated else [stepper.start(q=[0.4], v=[2.0])])):
         assert start[stepper.places["qpos"]] == 0.4 and start[stepper.places["qvel"]] == 2.0
@@ -248,12 +235,7 @@ def test_kv_of_every_servo_and_damper_changes_and_its_target_does_not(actuator, 
 FACTOR = 5.0
 CONTACTS = {  # option, geoms, pair; whether there is a time constant to change
     "of geoms": ("", 'solref="0.01 1"', "", True),
-    "of a pair": (
-        "",
-        'contype="0" conaffinity="0"',
-        '<pair geom1="ball" geom2="floor" solref="0.01 1"/>',
-        True,
-    ),
+    "of a pair": ("", 'contype="0" conaffinity="0"', '<pair geom1="ball" geom2="floor" solref="0.01 1"/>', True),
     "of the options": ('o_solref="0.01 1"><flag override="enable"/></option><option', "", "", True),
     "by stiffness and damping": ("", 'solref="-1000 -50"', "", False),
 }

@@ -91,13 +91,6 @@ def test_a_body_with_inertia_for_every_hinge_is_never_singular(rng):
         assert np.linalg.cond(tmt.mass_matrix(rng.uniform(-3, 3, (50, len(tree.parent))), tree)).max() < 1e9
 
 
-@pytest.mark.parametrize("name", ["colour", "hinge_names", "body_hinge"])
-def test_a_tree_has_its_own_fields_alone(name):
-    with pytest.raises(TypeError, match=name):
-        dataclasses.replace(tmt.ARM, **{name: (1, 2)})
-    assert not hasattr(tmt.ARM, name)
-
-
 def test_a_tree_is_shown_in_one_short_line_and_stated_by_all_its_numbers(rng):
     assert repr(tmt.ARM) == "Tree(3 joints: alpha, beta, gamma; 2 bodies)"
     assert repr(chain([X], inertia=np.eye(3))) == "Tree(1 joint: a; 1 body)"
