@@ -5,13 +5,13 @@ import doctest
 import inspect
 import json
 import re
+import runpy
 import shutil
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from runs import ENVIRONMENT, ROOT
+from runs import ROOT
 
 import compare
 import tmt
@@ -53,16 +53,17 @@ def write_fleet(folder):
 
 
 @pytest.mark.parametrize("path", CASES)
-def test_an_example_runs_and_says_what_it_finds(path, tmp_path):
+def test_an_example_runs_and_says_what_it_finds(path, tmp_path, monkeypatch, capsys):
     if path.stem == "exported_c" and not shutil.which("gcc"):
         pytest.skip("needs gcc")
-    words = [sys.executable, path, *GIVEN.get(path.stem, ())]
     if path.stem == "marks":
         write_fleet(tmp_path / "class")
-    run = subprocess.run(words, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True)
-    printed, left = EXPECTED[path.stem]
-    assert run.returncode == 0 and run.stderr == ""
-    assert re.search(printed, run.stdout, re.MULTILINE), run.stdout
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    monkeypatch.setattr(sys, "argv", [str(path), *map(str, GIVEN.get(path.stem, ()))])
+    runpy.run_path(str(path), run_name="__main__")
+    (printed, left), (out, err) = EXPECTED[path.stem], capsys.readouterr()
+    assert err == "" and re.search(printed, out, re.MULTILINE), out
     assert {file.name for file in tmp_path.iterdir()} == left
     text = path.read_text(encoding="utf-8")
     assert len(text.partition('"""\n')[0].splitlines()) == 2 and len(text.splitlines()) <= 40
