@@ -116,9 +116,7 @@ class Motion(NamedTuple):
     # when and why a run ended early, or None; of a batch an array of its shape
     ended: str | Array | None = None
     steps: int | None = None  # that the method took; None: not known
-    seconds: float | None = None  # of the run, where the engine measures it in a process of its own
-    # of its steps without Python's share; None: there is none, or it is not known
-    seconds_alone: float | None = None
+    seconds: float | None = None  # of the engine's own steps, where it measures them in a process of its own
 
     @property
     def states(self) -> Array:
@@ -210,7 +208,7 @@ class OneByOne(ABC):
 
 
 class Engine(Protocol):
-    """One engine with its methods of integration, by their names. Engines may be of this shape without this class."""
+    """One engine with its methods of integration, by their names."""
 
     name: str
 
@@ -235,10 +233,6 @@ class Engine(Protocol):
 def compared(engines: Mapping[str, Engine], case: Case) -> dict[str, Dynamics]:
     """The dynamics of a case in the two engines that are compared, by their names, mujoco last."""
     return {name: engines[name].of(case) for name in case.robot.compared}
-
-
-def methods_in(engine: Engine, case: Case) -> Mapping[str, Method]:
-    return engine.methods_in(case) if hasattr(engine, "methods_in") else engine.methods
 
 
 def rows_of_states(*values: ArrayLike) -> tuple[tuple[int, ...], list[Array]]:

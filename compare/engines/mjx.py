@@ -22,7 +22,6 @@ ENGINE = EngineRecord(
 )  # fmt: skip
 # its fusions repeat what they share: an acceleration of an arm of seven hinges took 412 ms, 3 ms without them
 COMPILER = {"xla_cpu_use_fusion_emitters": False}
-STIFFNESS_AND_DAMPING = ("jnt_stiffness", "dof_damping")
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
@@ -47,22 +46,12 @@ class Model(OfCompiled):
     def held(self, model: Any, name: str) -> Array:
         return np.array(attrgetter(name)(model))
 
-    def values(self, at: State, force: Array) -> tuple[Array, ...]:
-        """M, h and the acceleration, without damping and stiffness, which are part of the force."""
-        model = self.first.replace(
-            **{name: 0.0 * getattr(self.first, name) for name in STIFFNESS_AND_DAMPING}
-        )
+    def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
+        """Without damping and stiffness, which are part of the force."""
+        none = {name: 0.0 * getattr(self.first, name) for name in ("jnt_stiffness", "dof_damping")}
         state = (values.astype(self.precision) for values in (at.x, at.u, force))
-        return tuple(map(np.asarray, functions()["values"](model, self.data, *state)))
-
-    def mass_matrix(self, at: State) -> Array:
-        return self.values(at, 0.0 * at.u)[0]
-
-    def bias(self, at: State) -> Array:
-        return self.values(at, 0.0 * at.u)[1]
-
-    def acceleration(self, at: State, force: Array) -> Array:
-        return self.values(at, force)[2]
+        M, h, a = map(np.asarray, functions()["values"](self.first.replace(**none), self.data, *state))
+        return M, h, a
 
     def path(self, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
         model = model.tree_replace({"opt.timestep": np.asarray(course.dt, self.precision)})

@@ -31,12 +31,9 @@ FEATHERSTONE, BY_MUJOCO = "Featherstone", "SolverMuJoCo"  # of its solvers
 UNCONSTRAINED = 0b11111  # MuJoCo's flags that disable all constraints
 OFF = ("target_ke", "target_kd", "limit_ke", "limit_kd")  # actuators and limits
 PASSIVE = "damping", "stiffness"
-
-
-METHODS = {FEATHERSTONE: (1, "newton_featherstone")}  # semi-implicit Euler whose damping is explicit
-METHODS |= {
-    f"{BY_MUJOCO} {name}": OF_WARP[name] for name in ("implicitfast", "RK4")
-}  # others are MuJoCo Warp's too
+# Featherstone: semi-implicit Euler whose damping is explicit; SolverMuJoCo has the others of MuJoCo Warp too
+METHODS = {FEATHERSTONE: (1, "newton_featherstone")}
+METHODS |= {f"{BY_MUJOCO} {name}": OF_WARP[name] for name in ("implicitfast", "RK4")}
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
@@ -138,28 +135,25 @@ class Model(ReadModel):
         self.state.joint_qd.assign(at.u)
         self.newton.eval_fk(self.model, self.state.joint_q, self.state.joint_qd, self.state)
 
-    def mass_matrix(self, at: State) -> Array:
-        """Each tree of the file is an articulation of its own."""
+    def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
+        """Each tree of the file is an articulation of its own. Accelerations are those of a step of Featherstone's."""
         self.set_state(at)
         sizes = np.diff(self.firsts[self.model.articulation_start.numpy()])
         blocks = self.newton.eval_mass_matrix(self.model, self.state).numpy()
-        return block_diag(*(block[:size, :size] for block, size in zip(blocks, sizes))).astype(float)
-
-    def bias(self, at: State) -> Array:
-        M = self.mass_matrix(at)
+        M = block_diag(*(block[:size, :size] for block, size in zip(blocks, sizes))).astype(float)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
-        forces = {"gravity_force": weight, "coriolis_force": rest}
-        self.newton.eval_inverse_dynamics_passive(self.model, self.state, **forces)
-        return np.asarray(weight.numpy().astype(float) + rest.numpy() + M @ at.c)
+        self.newton.eval_inverse_dynamics_passive(self.model, self.state, gravity_force=weight, coriolis_force=rest)
+        h = weight.numpy().astype(float) + rest.numpy() + M @ at.c
+        self.start(at, 1.0, None)
+        return M, h, self.reached(force)[1] - at.u
 
     def start(self, at: State, dt: float, method: str | None) -> None:
         """Prepare steps of dt from a state; method None: of Featherstone's, without damping and springs."""
         for name in PASSIVE:
             values = self.used[name][self.order.v] * (method is not None)
             getattr(self.model, f"joint_{name}").assign(values)
-        is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
         is_damped = self.used["damping"][self.order.is_of_free()].any()
-        if method == FEATHERSTONE and (is_damped or self.used["stiffness"][is_of_ball].any()):
+        if method == FEATHERSTONE and (is_damped or self.used["stiffness"][self.order.is_of_ball()].any()):
             raise EngineError("Featherstone has no springs of ball joints and no damping of free joints")
         self.set_state(at)
         self.method, self.dt = method or FEATHERSTONE, dt
@@ -174,10 +168,6 @@ class Model(ReadModel):
         self.state, self.next = self.next, self.state
         x, u = (values.numpy().astype(float) for values in (self.state.joint_q, self.state.joint_qd))
         return x, u
-
-    def acceleration(self, at: State, force: Array) -> Array:
-        self.start(at, 1.0, None)
-        return self.reached(force)[1] - at.u
 
     def step_alone(self, course: Course) -> Callable[[], object]:
         self.start(self.order.state(course.q, course.v), course.dt, course.method)

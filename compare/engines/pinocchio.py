@@ -11,9 +11,8 @@ from .outside.file import File, OtherJoints, OtherNames
 from .outside.model import ReadModel
 from .outside.order import XYZW, Order, State, of_free
 
-ENGINE = EngineRecord(
-    order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", reads_file=True
-)
+ENGINE = EngineRecord(order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio",
+                      reads_file=True)  # fmt: skip
 METHODS: dict[str, tuple[int, str]] = {}  # it has no integrators
 FREE, COMPOSITE = "JointModelFreeFlyer", "JointModelComposite"
 
@@ -70,12 +69,8 @@ class Model(ReadModel):
     def set_body(self, link: Link, body: Body) -> None:
         self.model.inertias[link.name] = self.pinocchio.Inertia(*body)
 
-    def mass_matrix(self, at: State) -> Array:
-        upper = np.triu(self.pinocchio.crba(self.model, self.data, at.x))
-        return np.asarray(upper + np.triu(upper, 1).T)
-
-    def bias(self, at: State) -> Array:
-        return np.array(self.pinocchio.rnea(self.model, self.data, at.x, at.u, at.c))
-
-    def acceleration(self, at: State, force: Array) -> Array:
-        return np.array(self.pinocchio.aba(self.model, self.data, at.x, at.u, force))
+    def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
+        model, data = self.model, self.data
+        upper = np.triu(self.pinocchio.crba(model, data, at.x))
+        bias = self.pinocchio.rnea(model, data, at.x, at.u, at.c).copy()
+        return upper + np.triu(upper, 1).T, bias, self.pinocchio.aba(model, data, at.x, at.u, force).copy()

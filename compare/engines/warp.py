@@ -27,28 +27,29 @@ METHODS = OF_MJX | {"implicit": (1, "implicit"), "discrete": (1, "semi_implicit_
 def methods_for(tree: Tree) -> dict[str, tuple[int, str]]:
     """METHODS for a Tree: as MuJoCo since 4.0, implicitfast and discrete are implicit in the bias of a free body on its own, and
     discrete in springs."""
-    lone = (
-        {"implicitfast": (1, "implicitfast"), "discrete": (1, "implicitfast")}
-        if isolated_speeds(tree)
-        else {}
-    )
+    lone = dict.fromkeys(("implicitfast", "discrete"), (1, "implicitfast")) if isolated_speeds(tree) else {}
     return METHODS | lone | ({"discrete": (1, "discrete")} if tree.has_springs else {})
+
+
+def loaded() -> tuple[Any, Any]:
+    """warp, on the CPU, and mujoco_warp."""
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    warp.set_device("cpu")
+    import mujoco_warp
+
+    return warp, mujoco_warp
 
 
 class Model(OfCompiled):
     methods, rotors_in_joints = tuple(METHODS), True
 
     def __init__(self, file: File, precision: str):
-        import warp
-
-        warp.config.log_level = warp.LOG_ERROR
-        warp.set_device("cpu")
-        import mujoco_warp
-
-        self.warp, self.engine = warp, mujoco_warp
+        self.warp, self.engine = loaded()
         super().__init__(file, precision)
         # njmax=0 is possible, but then Euler and implicitfast do not accelerate
-        self.data = mujoco_warp.make_data(self.bare, nconmax=0, njmax=1)
+        self.data = self.engine.make_data(self.bare, nconmax=0, njmax=1)
 
     def put_models(self) -> None:
         super().put_models()
@@ -77,26 +78,14 @@ class Model(OfCompiled):
             self.graphs[name] = capture.graph
         return lambda: self.warp.capture_launch(self.graphs[name])
 
-    def forward(self, at: State, force: Array) -> Any:
-        """Data after forward dynamics at a state."""
+    def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
         forward = self.replay("forward", lambda data: self.engine.forward(self.undamped, data))
         self.place(at.x, at.u, force)
         forward()
-        return self.data
-
-    def mass_matrix(self, at: State) -> Array:
-        M, model = np.zeros((at.u.size, at.u.size)), self.undamped
-        row, column = np.repeat(np.arange(at.u.size), model.M_rownnz.numpy()), model.M_colind.numpy()
-        M[row, column] = M[column, row] = self.forward(at, 0.0 * at.u).M.numpy()[
-            0
-        ]  # the lower triangle, row by row
-        return M
-
-    def bias(self, at: State) -> Array:
-        return np.array(self.forward(at, 0.0 * at.u).qfrc_bias.numpy()[0])
-
-    def acceleration(self, at: State, force: Array) -> Array:
-        return np.array(self.forward(at, force).qacc.numpy()[0])
+        M, row = np.zeros((at.u.size, at.u.size)), np.repeat(np.arange(at.u.size), self.undamped.M_rownnz.numpy())
+        column, data = self.undamped.M_colind.numpy(), self.data
+        M[row, column] = M[column, row] = data.M.numpy()[0]  # the lower triangle, row by row
+        return M, data.qfrc_bias.numpy()[0].copy(), data.qacc.numpy()[0].copy()
 
     def step_alone(self, course: Course) -> Callable[[], None]:
         return self.begun(self.model_of(course), self.placed(course.q, course.v, course.tau), course)
@@ -121,13 +110,8 @@ class Model(OfCompiled):
 
 class Stepper(as_it_runs.Stepper):
     def __init__(self, file: File, model: Any):
-        import warp
-
-        warp.config.log_level = warp.LOG_ERROR
-        warp.set_device("cpu")
-        import mujoco_warp
-
-        self.engine, self.model, self.put_model = mujoco_warp, model, mujoco_warp.put_model(model)
+        (_, self.engine), self.model = loaded(), model
+        self.put_model = self.engine.put_model(model)
 
     def put(self, data: Any) -> Any:
         return self.engine.put_data(self.model, data, nconmax=MOST_CONTACTS, njmax=MOST_ROWS)

@@ -13,7 +13,7 @@ A process of its own keeps an engine's threads, its precision and a crash away f
 """
 
 from collections.abc import Callable, Mapping
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -85,19 +85,19 @@ class OutsideDynamics(OneByOne):
         except WorkerEnded:
             raise EngineError("its process was killed") from None
 
-    def rows(self, quantity: str, *values: Array) -> Array:
-        """A quantity at many states, (states, ...)."""
-        states = [np.atleast_2d(np.asarray(value, float)) for value in values]
-        return self.ask(answers.each, quantity, *states)
+    def at(self, q: Array, v: Array, tau: Array) -> tuple[Array, ...]:
+        """M, h and accelerations at states, one or (states, n)."""
+        return self.ask(answers.each, *np.atleast_2d(q, v, tau - passive(self.tree, q, v)))
 
     def mass_matrix(self, q: Array) -> Array:
-        return self.rows("mass_matrix", q)
+        rest = np.zeros((len(np.atleast_2d(q)), self.coordinates.nv))
+        return self.at(q, rest, rest)[0]
 
     def bias(self, q: Array, v: Array) -> Array:
-        return self.rows("bias", q, v)
+        return self.at(q, v, np.zeros_like(v))[1]
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
-        return self.rows("acceleration", q, v, tau - passive(self.tree, q, v))
+        return self.at(q, v, tau)[2]
 
     def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
         if self.reading.not_set:
@@ -106,15 +106,12 @@ class OutsideDynamics(OneByOne):
 
     def prepared(self, course: Course) -> Prepared:
         self.seconds_prepared, step_alone = self.ask(answers.prepared, course)
-        alone = None if step_alone is None else step_alone * course.steps
-
-        def run() -> Motion:
-            return self.ask(answers.ran, course)
 
         def read(motion: Motion) -> Motion:
-            return motion._replace(steps=course.steps or None, seconds_alone=alone)
+            seconds = motion.seconds if step_alone is None else step_alone * course.steps
+            return motion._replace(steps=course.steps or None, seconds=seconds)
 
-        return run, read
+        return partial(self.ask, answers.ran, course), read
 
 
 @cache

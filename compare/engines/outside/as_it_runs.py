@@ -24,9 +24,7 @@ BEYOND = {"float32": 1e-4, "float64": FACTOR * EPS}
 LS_ITERATIONS = 50  # at least, of a run with more iterations than the file's own
 # an acceleration solves M, and the solver stops at its own tolerance
 SOLVED = "qacc_smooth", "efc_force", "qfrc_constraint", "qacc", "qvel after", "qpos after"
-
-
-PASSING = 1e-2
+PASSING = 1e-2  # of the largest entry of a field over all steps: a difference is beside that at least
 FIELDS = (
     "xpos", "M", "qfrc_bias", "qfrc_passive", "qfrc_actuator", "contacts", "dist", "efc_J", "efc_aref", "qacc_smooth",
     "efc_force", "qfrc_constraint", "qacc", "qvel after", "qpos after",
@@ -76,36 +74,30 @@ class Stepper(ABC):
         """Data of the engine's in MuJoCo's."""
 
 
-def run(
-    kind: Callable[[File, Any], Stepper], precision: str, file: File, iterations: int | None = None
-) -> Run:
+Fields = dict[str, Array]  # of a step
+Kind = Callable[[File, Any], Stepper]
+
+
+def run(kind: Kind, precision: str, file: File, iterations: int | None = None) -> Run:
     """A run of the file by an engine; iterations: of the solver, with LS_ITERATIONS at least; None: the file's own."""
     source = Source(file.path, file.floating)
     model = mujoco.MjModel.__copy__(source.model)
     model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     if iterations is not None:
-        model.opt.iterations, model.opt.ls_iterations = (
-            iterations,
-            max(LS_ITERATIONS, model.opt.ls_iterations),
-        )
+        model.opt.iterations = iterations
+        model.opt.ls_iterations = max(LS_ITERATIONS, model.opt.ls_iterations)
     return one_run(kind, file, model, precision)
 
 
-def one_run(
-    kind: Callable[[File, Any], Stepper],
-    file: File,
-    model: mujoco.MjModel,
-    precision: str,
-    steps: int = STEPS,
-) -> Run:
+def one_run(kind: Kind, file: File, model: mujoco.MjModel, precision: str, steps: int = STEPS) -> Run:
     """Steps from the first keyframe with its controls, else from qpos0."""
     begin, engine, data = time.process_time(), kind(file, model), mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)  # for the warm start
     free, apart = engine.put(data), dict[int, float]()
-    made, moved = list[Fields](), mujoco.MjData(model)
+    made, moved = list[Sequence[Fields]](), mujoco.MjData(model)
     for step in range(1, steps + 1):
         other = engine.get(engine.step(engine.put(data)))
         free = engine.step(free)
@@ -116,7 +108,7 @@ def one_run(
         mujoco.mj_step(model, data)
         if not np.isfinite(data.qacc).all():
             break
-        made.append(Fields(fields(model, data), fields(model, moved), fields(engine.model, other)))
+        made.append((fields(model, data), fields(model, moved), fields(engine.model, other)))
         if step in LISTED:
             apart[step] = float(np.abs(data.qpos - engine.get(free).qpos).max())
     of_fields = compared(model, made, BEYOND[precision])
@@ -124,25 +116,17 @@ def one_run(
     return Run(int(model.opt.iterations), int(model.opt.ls_iterations), apart, *of_fields, seconds)
 
 
-class Fields(NamedTuple):
-    """The fields of a step: MuJoCo's, those from a state that is moved by its rounding, the engine's."""
-
-    mine: dict[str, Array]
-    moved: dict[str, Array]
-    others: dict[str, Array]
-
-    def distance(self, name: str, others: dict[str, Array]) -> Array:
-        """Of each entry of a field; infinite where it has others, or is not a number."""
-        values = self.mine[name]
-        if values.shape != others[name].shape:
-            return np.array([np.inf])
-        return np.nan_to_num(np.abs(values - others[name]), nan=np.inf).ravel()
+def distance(values: Array, others: Array) -> Array:
+    """Of each entry of a field; infinite where another one has others, or is not a number."""
+    if values.shape != others.shape:
+        return np.array([np.inf])
+    return np.nan_to_num(np.abs(values - others), nan=np.inf).ravel()
 
 
 def compared(
-    model: mujoco.MjModel, made: Sequence[Fields], beyond: float
+    model: mujoco.MjModel, made: Sequence[Sequence[Fields]], beyond: float
 ) -> tuple[Difference | None, dict[str, float], float]:
-    """first, largest and over of a Run.
+    """first, largest and over of a Run. made: of steps the fields of MuJoCo, from a moved state, and of the engine.
 
     A field may differ by `beyond` of its largest entry, and by FACTOR times what the rounding of the state makes of it: the
     distance of a contact is a small difference of positions, and a force at rest follows from that.
@@ -151,15 +135,15 @@ def compared(
     # of Runge and Kutta's stages MuJoCo leaves the mean in qacc, others the last: "qvel after" says the same
     is_mean = model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4
     listed = [name for name in FIELDS if not (name == "qacc" and is_mean)]
-    peaks = {name: max(size(of.mine[name]) for of in made) for name in listed if made}
-    for step, of in enumerate(made, 1):
+    peaks = {name: max(size(mine[name]) for mine, *_ in made) for name in listed if made}
+    for step, (mine, moved, others) in enumerate(made, 1):
         for name in listed:
-            scale = max(size(of.mine[name]), PASSING * peaks[name]) or 1.0
+            scale = max(size(mine[name]), PASSING * peaks[name]) or 1.0
             allowed = max(beyond, model.opt.tolerance) if name in SOLVED else beyond
-            rounding = size(of.distance(name, of.moved)) / scale
+            rounding = size(distance(mine[name], moved[name])) / scale
             if rounding == np.inf:  # a contact is there or not, by rounding
                 continue
-            distances = of.distance(name, of.others)
+            distances = distance(mine[name], others[name])
             share, worst = size(distances) / scale, int(distances.argmax()) if distances.size else 0
             largest[name] = max(largest.get(name, 0.0), share)
             over = max(over, share / max(allowed, FACTOR * rounding))
@@ -173,7 +157,7 @@ def size(values: Array) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
-def fields(m: mujoco.MjModel, d: mujoco.MjData) -> dict[str, Array]:
+def fields(m: mujoco.MjModel, d: mujoco.MjData) -> Fields:
     """The fields of a step in the order of the pipeline, whatever the order of contacts and of the constraints' rows.
 
     J of the rows is joined to J'J, (nv, nv), aref to J'aref, force to |J|'|force|, (nv,).
@@ -184,10 +168,8 @@ def fields(m: mujoco.MjModel, d: mujoco.MjData) -> dict[str, Array]:
     pairs, distances = [pair for pair, _ in contacts], [distance for _, distance in contacts]
     constraints = rows.T @ rows, rows.T @ d.efc_aref[: d.nefc], d.qacc_smooth, force, d.qfrc_constraint
     smooth = d.xpos, M, d.qfrc_bias, d.qfrc_passive, d.qfrc_actuator, pairs, distances
-    return {
-        name: np.array(value, float)
-        for name, value in zip(FIELDS, (*smooth, *constraints, d.qacc, d.qvel, d.qpos))
-    }
+    values = *smooth, *constraints, d.qacc, d.qvel, d.qpos
+    return {name: np.array(value, float) for name, value in zip(FIELDS, values)}
 
 
 def contacts_of(d: mujoco.MjData) -> Iterator[tuple[tuple[int, int], float]]:

@@ -89,26 +89,17 @@ def body_numbers(
     (joints, 3) m: of a hinge, the point of its axis that is nearest to the world's origin; both 0 of a ball.
     """
     before, joints = links_at(reference), coordinates.places.joints
-    mass, com, inertia = together(before, len(joints))
-    _, com_moved, _ = together(links_at(moved), len(joints))
+    numbers = together(before, len(joints)) | {"com_moved": together(links_at(moved), len(joints))["com"]}
     axis, anchor = np.zeros((2, len(joints), 3))
     for k, joint in enumerate(joints):
         if joint.kind == "ball":
             continue
-        turn, shift = movement(
-            before, links_at(coordinates.move(reference, np.eye(coordinates.nv)[joint.qd.start]))
-        )
+        after = links_at(coordinates.move(reference, np.eye(coordinates.nv)[joint.qd.start]))
+        turn, shift = movement(before, after)
         axis[k] = shift if joint.kind == "slide" else Rotation.from_matrix(turn).as_rotvec()
         if joint.kind == "hinge":
             anchor[k] = np.linalg.pinv(np.eye(3) - turn, CUTOFF) @ shift
-    return {
-        "mass": mass,
-        "com": com,
-        "inertia": inertia,
-        "axis": axis,
-        "anchor": anchor,
-        "com_moved": com_moved,
-    }
+    return numbers | {"axis": axis, "anchor": anchor}
 
 
 def size_of(stated: Numbers, number: str) -> float:
@@ -138,14 +129,13 @@ def movers(links: Sequence[Link]) -> list[int | None]:
     return [mover(link) for link in links]
 
 
-def together(links: Sequence[Link], joints: int) -> tuple[Array, Array, Array]:
+def together(links: Sequence[Link], joints: int) -> dict[str, Array]:
     """mass, com and inertia of body_numbers, of links at a posture."""
     bodies: list[list[Body]] = [[] for _ in range(joints)]
     for link, joint in zip(links, movers(links)):
         if joint is not None:
             bodies[joint].append(link.in_world)
-    mass, com, inertia = map(np.array, zip(*map(combined, bodies)))
-    return mass, com, inertia
+    return dict(zip(Body._fields, map(np.array, zip(*map(combined, bodies)))))
 
 
 def movement(before: Sequence[Link], after: Sequence[Link]) -> tuple[Array, Array]:

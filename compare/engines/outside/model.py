@@ -55,16 +55,13 @@ class ReadModel(ABC):
         return None
 
     @abstractmethod
-    def mass_matrix(self, at: State) -> Array:
-        """M (nv, nv), with the armature."""
+    def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
+        """M, h and a at a state, of its own equations.
 
-    @abstractmethod
-    def bias(self, at: State) -> Array:
-        """The force (nv,) for an acceleration that is 0 in the Tree: h + M c, of Coriolis, centrifugal and gravity terms only."""
-
-    @abstractmethod
-    def acceleration(self, at: State, force: Array) -> Array:
-        """(nv,), from M a = force - h by the engine's own forward dynamics; damping and springs are part of the force."""
+        M (nv, nv) with the armature; h (nv,), the force of Coriolis, centrifugal and gravity terms for an acceleration
+        that is 0 in the Tree, h + M c; a (nv,) from M a = force - h by its forward dynamics: the force, (nv,), has
+        damping and springs.
+        """
 
     def prepare(self, course: Course) -> None:
         """Make what a run needs that does not depend on its start and length: objects, compiled code."""

@@ -115,6 +115,10 @@ class Order:
                 free[joint.qd.start - 3 : joint.qd.stop] = True
         return free
 
+    def is_of_ball(self) -> Array:
+        """Whether a speed of the Tree is that of a ball, a free joint's too, (nv,)."""
+        return np.array(self.file.coordinates.kinds_of_speeds) == "ball"
+
     def engine_positions(self, q: Array) -> Array:
         x, moved = np.empty(max(part.stop for _, part, _ in self.parts)), q - self.reference
         for place, part, code in self.parts:

@@ -7,23 +7,25 @@ import numpy as np
 
 from tmt import Tree
 
-from ...robots.coordinates import point_inertia
-from .. import Array, Course, EngineRecord
-from ..outside.bodies import Body, Link
-from ..outside.file import File, OtherJoints, OtherNames
-from ..outside.model import ReadModel
-from ..outside.order import ANGLES, Order, State, of_free
-from .simulation import DISCRETE, SCHEMES, Simulation, fixed_force
+from ..robots.coordinates import point_inertia
+from . import Array, Course, EngineRecord
+from .outside.bodies import Body, Link
+from .outside.file import EngineError, File, OtherJoints, OtherNames
+from .outside.model import ReadModel
+from .outside.order import ANGLES, Order, State, of_free
 
-ENGINE = EngineRecord(
-    order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake", reads_file=True
-)
+ENGINE = EngineRecord(order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake",
+                      reads_file=True)  # fmt: skip
+SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
+           "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
+ADAPTIVE, DISCRETE = " adaptive", "discrete"  # of some schemes; the plant's own step
+ITERATES, ITERATED = ("implicit Euler", "Radau3"), 1e-12  # relative accuracy of iterations at fixed steps
+LONGEST = 0.1  # s, of a step of a method that chooses its own: Drake's default
 METHODS: dict[str, tuple[int | None, str]] = {
-    name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()
+    **{name: (order, f"drake_{scheme}") for name, (order, scheme) in SCHEMES.items()},
+    **{name + ADAPTIVE: (None, f"drake_{SCHEMES[name][1]}_adaptive") for name in ("RK3", "RK5", "Radau3")},
+    DISCRETE: (1, "semi_implicit_euler"),
 }
-for name in ("RK3", "RK5", "Radau3"):
-    METHODS[f"{name} adaptive"] = None, f"drake_{SCHEMES[name][1]}_adaptive"
-METHODS[DISCRETE] = 1, "semi_implicit_euler"
 
 
 def methods_for(tree: Tree) -> dict[str, tuple[int | None, str]]:
@@ -37,7 +39,6 @@ class Model(ReadModel):
     def __init__(self, file: File, precision: str):
         self.file = file
         self.inertias: dict[Any, Any] = {}  # of bodies that are set
-        self.simulated: tuple[object, ...] | None = None  # what the last simulation is of
         plant, rotors = self.parsed(0.0)
         plant.Finalize()
         joints = joints_of(plant)
@@ -104,9 +105,8 @@ class Model(ReadModel):
             if place.kind == "ball":  # a free joint is there only once the plant is final
                 continue
             joint = plant.get_joint(index)
-            armature, stiffness = (
-                float(self.used[name][place.qd.start]) for name in ("armature", "stiffness")
-            )
+            speed = place.qd.start
+            armature, stiffness = float(self.used["armature"][speed]), float(self.used["stiffness"][speed])
             if armature:
                 plant.AddJointActuator(f"rotor of {joint.name()}", joint).set_default_rotor_inertia(armature)
             if stiffness and has_springs:
@@ -117,7 +117,7 @@ class Model(ReadModel):
 
     def settle(self) -> None:
         """Make the plant of single states."""
-        self.simulated = None
+        self.simulated: tuple[object, ...] = ()  # what the last simulation is of
         self.plant = self.plant_of(0.0, has_springs=False)
         self.context = self.plant.CreateDefaultContext()
         self.set_numbers(self.plant, self.context, acts=False)
@@ -136,8 +136,7 @@ class Model(ReadModel):
         """Balls have no rotor and no spring, and the damping of a free body is in other axes: they are left as they are."""
         is_left = np.zeros(np.shape(values), bool)
         if name != "gravity":
-            is_of_ball = np.array(self.file.coordinates.kinds_of_speeds) == "ball"
-            is_left = self.order.is_of_free() | (is_of_ball & (name != "damping"))
+            is_left = self.order.is_of_free() | (self.order.is_of_ball() & (name != "damping"))
         self.rest = self.stated["rest"]
         self.used[name] = np.where(is_left, self.used[name], values)
         self.settle()
@@ -169,34 +168,59 @@ class Model(ReadModel):
         self.inertias[BodyIndex(link.name)] = inertia
         self.set_numbers(self.plant, self.context, acts=False)
 
-    def mass_matrix(self, at: State) -> Array:
-        self.plant.SetPositions(self.context, at.x)
-        return np.array(self.plant.CalcMassMatrix(self.context))
-
-    def bias(self, at: State) -> Array:
-        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([at.x, at.u]))
-        gravity = self.plant.CalcGravityGeneralizedForces(self.context)
-        return np.asarray(self.plant.CalcBiasTerm(self.context) - gravity)
-
-    def acceleration(self, at: State, force: Array) -> Array:
-        self.plant.SetPositionsAndVelocities(self.context, np.concatenate([at.x, at.u]))
+    def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
+        plant, context = self.plant, self.context
+        plant.SetPositionsAndVelocities(context, np.concatenate([at.x, at.u]))
         self.force.SetFromVector(force)
-        return np.array(self.forward_dynamics.Eval(self.context))
+        bias = plant.CalcBiasTerm(context) - plant.CalcGravityGeneralizedForces(context)
+        return plant.CalcMassMatrix(context), bias, np.array(self.forward_dynamics.Eval(context))
 
     def prepare(self, course: Course) -> None:
-        self.simulation(course)
+        """Make the simulator of a course, with its force and integrator; the last one is kept."""
+        from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-    def simulation(self, course: Course) -> Simulation:
-        """That of a course; the last one is kept."""
         key = course.method, course.dt, course.steps, course.tolerance, course.tau.tobytes()
-        if key != self.simulated:
-            plant = self.plant_of(course.dt if course.method == DISCRETE else 0.0, has_springs=True)
-            self.simulated, self.last = key, Simulation(plant, self.order, course)
-            self.set_numbers(plant, self.last.context, acts=True)
-        return self.last
+        if key == self.simulated:
+            return
+        if course.tau[self.order.is_of_free() | self.order.is_of_ball()].any():
+            raise EngineError("a torque on a ball or a free body would turn with it, as Drake's axes do not")
+        plant = self.plant_of(course.dt if course.method == DISCRETE else 0.0, has_springs=True)
+        simulator = Simulator(plant)
+        context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+        self.set_numbers(plant, context, acts=True)
+        fixed_force(plant, context).SetFromVector(course.tau[self.order.v])
+        if course.method != DISCRETE:
+            scheme = SCHEMES[course.method.removesuffix(ADAPTIVE)][1]
+            integrator = ResetIntegratorFromFlags(simulator, scheme, course.dt if course.steps else LONGEST)
+            integrator.set_fixed_step_mode(course.tolerance is None)
+            if course.tolerance or course.method in ITERATES:
+                integrator.set_target_accuracy(course.tolerance or ITERATED)
+        self.simulated, self.simulation = key, (plant, context, simulator)
 
     def run(self, course: Course) -> tuple[Array, int]:
-        return self.simulation(course).run(course)
+        self.prepare(course)
+        (plant, context, simulator), is_discrete = self.simulation, course.method == DISCRETE
+        start = self.order.state(course.q, course.v)
+        simulator.get_mutable_context().SetTime(0.0)
+        plant.SetPositionsAndVelocities(context, np.concatenate([start.x, start.u]))
+        simulator.get_mutable_integrator().ResetStatistics()
+        simulator.Initialize()
+        states = [course.start]
+        for t in course.times[1:]:
+            try:  # the last of the discrete steps up to t begins at t - dt
+                simulator.AdvanceTo(t - 0.5 * course.dt if is_discrete else t)
+            except RuntimeError:  # it finds no step, or no solution of its equations
+                break
+            reached = self.order.tree_state(plant.GetPositions(context), plant.GetVelocities(context))
+            states.append(np.concatenate(reached))
+        evaluations = simulator.get_integrator().get_num_derivative_evaluations()
+        return np.array(states), course.steps if is_discrete else evaluations
+
+
+def fixed_force(plant: Any, context: Any) -> Any:
+    """The vector of generalized forces in a context, in Drake's order and axes."""
+    port = plant.get_applied_generalized_force_input_port()
+    return port.FixValue(context, np.zeros(plant.num_velocities())).GetMutableData().get_mutable_value()
 
 
 def joints_of(plant: Any) -> list[Any]:
