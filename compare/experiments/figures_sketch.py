@@ -23,7 +23,8 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
     is_small, lines = max(len(robot.joints), len(tree.mass)) <= MOST_NAMED, joint_lines(robot)
     fig = Figure(figsize=(WIDTH, 3.9))
     for k, (name, q) in enumerate(poses.items(), start=1):
-        ax: Any = fig.add_subplot(1, len(poses), k, projection="3d", facecolor="none", title=name)
+        look: dict[str, Any] = {"projection": "3d", "elev": ELEVATION, "azim": AZIMUTH, "facecolor": "none"}
+        ax: Any = fig.add_subplot(1, len(poses), k, box_aspect=(1, 1, 1), title=name, **look)
         (points,), links = stick_figure(robot, q[None])
         coms, frames = literal.com_positions(q, tree), method.joint_frames(tree, q.tolist())
         size = np.ptp(np.concatenate([points, coms]), axis=0).max() or 1.0  # m
@@ -33,7 +34,7 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
         for number, com in enumerate(coms if is_small else (), start=1):
             ax.text(*com + size * np.array([0.1, 0.0, -0.16]), str(number), path_effects=OUTLINE)
         for joint, kind, frame in zip(robot.joints, tree.kind, frames):
-            origin, axis = (np.array([*part], float) for part in (frame.origin, frame.axes[0]))
+            origin, axis = np.array([[*frame.origin], [*frame.axes[0]]], float)
             axis, colour = (0.57 if is_small else 0.1) * size * axis, lines[joint][0]
             if kind == "ball":
                 ax.plot(*origin[:, None], marker="o", markersize=11, color=colour, fillstyle="none")
@@ -44,12 +45,11 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
             if is_small:
                 ax.text(*origin + 1.3 * axis, robot.symbol(joint), color=colour, path_effects=OUTLINE)
         ends = np.reshape(ax.get_w_lims(), (3, 2))
-        cube = ends.mean(axis=1)[:, None] + 0.55 * np.ptp(ends, axis=1).max() * np.array([-1.0, 1.0])
-        ax.set(**{f"{axis}label": f"{label}, m" for axis, label in zip("xyz", robot.axes)})
-        ax.set(box_aspect=(1, 1, 1), **{f"{axis}lim": limits for axis, limits in zip("xyz", cube)})
+        half = 0.55 * np.ptp(ends, axis=1).max()
+        for axis, label, middle in zip("xyz", robot.axes, ends.mean(axis=1)):
+            ax.set(**{f"{axis}label": f"{label}, m", f"{axis}lim": (middle - half, middle + half)})
         ax.locator_params(nbins=4)
-        ax.view_init(elev=ELEVATION, azim=AZIMUTH)
     fig.subplots_adjust(left=0.0, right=0.95, bottom=0.1, top=0.93, wspace=0.05)
-    counts, has_free = {kind: tree.kind.count(kind) for kind in tree.kind}, bool(free_joints(tree))
-    values = {"noun": robot.noun, "bodies": tree.body_names if is_small else (), "counts": counts}
-    return file_name(robot.name), fig, Finding("parameters", "sketch", values | {"has_free": has_free})
+    values = {"noun": robot.noun, "bodies": tree.body_names if is_small else (), "has_free": bool(free_joints(tree)),
+              "counts": {kind: tree.kind.count(kind) for kind in tree.kind}}  # fmt: skip
+    return file_name(robot.name), fig, Finding("parameters", "sketch", values)

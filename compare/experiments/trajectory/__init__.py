@@ -6,17 +6,16 @@ from typing import Any, NamedTuple
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
-from ...engines import LABELS, Engine, methods_in
+from ...engines import LABELS, Engine
 from ...engines.mujoco.names import INTEGRATORS
 from ...judge.rounding import NARROW
-from ...judge.run import MOVES, leaves_no_digits, movement_unit
+from ...judge.run import LEFT, MOVES, deviation, leaves_no_digits, movement_unit, number_or_none
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import RECORDS, Reference, reference
 from .. import Experiment
 from ..setup import Setup, different_first
-from . import errors
-from .runs import TrajectoryResult, follow, recorded
+from .runs import SCHEMES_OF_RK4, TrajectoryResult, follow, recorded
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
@@ -64,7 +63,7 @@ def cases_left_out(setup: Setup, cases: Sequence[Case]) -> dict[str, float | Non
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
     of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part] for part in parts)
     for case in cases:
-        if not methods_in(setup.own, case) or not case.scene.gravity:
+        if not setup.own.methods_in(case) or not case.scene.gravity:
             left_out[case.name] = None
             continue
         seconds = of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case))
@@ -82,13 +81,49 @@ def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
         result.rows += part.rows
         result.checks += part.checks
         result.runs += part.runs
-    errors.find_errors(result, robot, dict(zip(work.names, work.true)))
+    find_errors(result, robot, dict(zip(work.names, work.true)))
     find_schemes(result, robot, setup.engines["mujoco"])
     if rows := [row for row in result.of_beginnings if row.level == "open loop"]:
         result.find("beginnings", rows=rows)
     if work.left_out:
         result.find("left_out", scenes=work.left_out)
     return result
+
+
+def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str, Reference]) -> None:
+    """The largest errors of RK4 with the coarsest step: of a held scene from rest, else from its reference.
+
+    Of a held scene also when each engine leaves the posture. A run that has diverged has no number.
+    """
+    scenes, unit = [], movement_unit(robot.coordinates)
+    claims = robot.claims.of_scenes if robot.claims else {}
+    for case in sorted(robot.cases, key=lambda case: not case.is_held):
+        run, reference = result.run_of(case, *SCHEMES_OF_RK4), references.get(case.name)
+        if not run or not (case.is_held or reference):
+            continue
+        largest: dict[str, float | None] = {}
+        for engine, path in run.paths.items():
+            error = deviation(path.q, path.q[0], case.coordinates)
+            if reference and not case.is_held:
+                error = reference.error(path.q).max()
+            largest[engine] = number_or_none(error)
+        first, second = largest.values()
+        result.errors[case.name] = first, second
+        apart = run.apart
+        scenes.append(
+            {"scene": case.name, "first": first, "second": second, "difference": apart, "unit": unit}
+        )
+        if case.is_held:
+            engines = [{"label": LABELS[engine], "left": path.left, "farthest": largest[engine]}
+                       for engine, path in run.paths.items()]  # fmt: skip
+            result.find("held", scene=robot.scene_begins(case.name), engines=engines, claim=claims.get(case.name),
+                        limit=LEFT, duration=case.duration, unit=unit, stated=robot.compared[0] == "tmt")  # fmt: skip
+    if result.errors:
+        counts = {min(run.steps for run in result.runs if run.case.name == name) for name in result.errors}
+        steps = counts.pop() if len(counts) == 1 else None
+        result.answer = result.finding("answer", errors=result.errors, steps=steps, unit=unit)
+    if any(name in references for name in result.errors):  # held scenes have their own findings
+        result.find("errors", labels=[LABELS[engine] for engine in robot.compared], scenes=scenes)
 
 
 def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None:

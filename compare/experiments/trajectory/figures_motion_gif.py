@@ -15,8 +15,7 @@ from ...judge.run import movement_unit, step_in_words
 from ...report.style import BLUE, ORANGE
 from ...robots import Robot
 from ...robots.stick import as_seen, stick_figure
-from .errors import SCHEMES_OF_RK4
-from .runs import Run
+from .runs import SCHEMES_OF_RK4, Run
 
 FRAMES = 128  # of a scene at most, without its start
 SCENES = 2

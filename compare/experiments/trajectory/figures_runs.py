@@ -18,7 +18,6 @@ from ...report.style import BLUE, GREY, LINES, ORANGE, RED, WIDTH, file_name, ze
 from ...robots import Robot
 from ...robots.case import Case
 from ..figures import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
-from .errors import difference_while_judged
 from .runs import Run, TrajectoryResult
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
@@ -47,7 +46,7 @@ def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Fig
     fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS + 1)
     caption = result.finding(
         "figure_held", number=number, scene=name, end=end, steps=run.steps, limit=LEFT, engines=engines,
-        judged=run.judged_until, apart=difference_while_judged(run), unit=movement_unit(run.case.coordinates),
+        judged=run.judged_until, apart=run.apart, unit=movement_unit(run.case.coordinates),
     )  # fmt: skip
     return f"assignment_figure_{number}", fig, caption
 
@@ -63,11 +62,9 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     axes = fig.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
     for (positions, speeds, below), run in zip(axes.T, runs):
         moved = {engine: case.coordinates.difference(path.q, path.q[0]) for engine, path in run.paths.items()}
-        for ax, of_engines in (
-            (positions, moved),
-            (speeds, {name: path.v for name, path in run.paths.items()}),
-        ):
-            alive = [run.until_diverged(engine, of_engine) for engine, of_engine in of_engines.items()]
+        speed = {engine: path.v for engine, path in run.paths.items()}
+        for ax, of_engines in ((positions, moved), (speeds, speed)):
+            alive = [run.until_diverged(*of_engine) for of_engine in of_engines.items()]
             over_time(ax, run, alive, shown, 64 // len(runs))
         positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
         draw_difference(below, run, result.label)
@@ -81,11 +78,10 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     fig.align_ylabels(axes[:, 0])
     add_legend(fig, axes, any(len(case.coordinates.speeds[i]) > LONG for i in shown))
     rows = [row for row in result.rows if row.scene == case.name and row.level == "open loop"]
+    share = largest_known([row.difference_over_band for row in rows])
     caption = result.finding(
-        "figure_run", scene=case.robot.scene_begins(case.name), shown=len(shown),
-        positions=case.coordinates.nv,
-        share=largest_known([row.difference_over_band for row in rows]),
-        judged=[(run.integrator, run.judged_until) for run in runs],
+        "figure_run", scene=case.robot.scene_begins(case.name), shown=len(shown), positions=case.coordinates.nv,
+        share=share, judged=[(run.integrator, run.judged_until) for run in runs],
     )  # fmt: skip
     return file_name("trajectory", case.name), fig, caption
 
@@ -133,15 +129,13 @@ def over_time(
 
 
 def label_axis(ax: Axes, name: str, unit: str) -> None:
-    """Name a vertical axis, with the power of ten by which its numbers are multiplied."""
+    """Name a vertical axis."""
     low, high = ax.get_ylim()
     largest = max(abs(low), abs(high))
     if high - low < LEVEL * largest:  # a position that does not change: its numbers would all be alike
         ax.set_ylim((low + high) / 2 - 0.05 * largest, (low + high) / 2 + 0.05 * largest)
-    power = int(np.floor(np.log10(largest)))
-    factor = 1.0 if -2 <= power <= 3 else 10.0**power
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value / factor:g}".replace("-", "\N{MINUS SIGN}"))
-    ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
+    ax.ticklabel_format(axis="y", scilimits=(-2, 4), useOffset=False)
+    ax.set_ylabel(f"{name}, {unit}")
 
 
 def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:

@@ -11,7 +11,7 @@ from tmt.methods import METHODS
 from ...core.check import About, Result
 from ...core.rows import Row, column
 from ...core.text import say
-from ...engines import LABELS, Dynamics, Engine, Method, compared, methods_in
+from ...engines import LABELS, Dynamics, Engine, Method, compared
 from ...judge import run as rules
 from ...judge.agree import closest
 from ...judge.rounding import NARROW, band, step_rounding
@@ -23,6 +23,7 @@ STEPS_AT_MOST = 8192  # of a run that is finer than the scene's own
 # decay rate times dt up to which RK4 is stable: beyond, each stage multiplies the rounding of the one before
 FASTEST = 2.785
 BEARABLE = 2.0  # the fastest rate times dt up to which every scheme is stable, about
+SCHEMES_OF_RK4 = ("rk4", "rk4_mean_speed")
 RECORDED = 64  # states of a run that are compared: one for each of the scene's own steps, or fewer
 
 
@@ -91,6 +92,13 @@ class Run:
         return [path.ended for path in self.paths.values()]
 
     @property
+    def apart(self) -> float:
+        """The largest difference of the engines while they are judged, rad or m."""
+        last = int(np.searchsorted(self.t, self.judged_until * (1 + 1e-9), side="right"))
+        first, mujoco = (path.q[: last : self.every] for path in self.paths.values())
+        return float(rules.moved_from(first, mujoco, self.case.coordinates).max())
+
+    @property
     def where(self) -> str:
         """The place of its checks."""
         return f"{self.case.name}, {self.integrator}, {rules.step_in_words(self.case, self.steps)}"
@@ -142,9 +150,9 @@ def follow(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]) -> T
     """One case with every scheme that both engines have. finer: multiples of the scene's own steps."""
     first, mujoco = case.robot.compared
     result, dynamics = TrajectoryResult("trajectory", label=LABELS[first]), compared(engines, case)
-    available = {method.scheme for method in methods_in(engines[first], case).values()}
+    available = {method.scheme for method in engines[first].methods_in(case).values()}
     schemes: dict[str, list[Method]] = {}
-    for method in methods_in(engines[mujoco], case).values():
+    for method in engines[mujoco].methods_in(case).values():
         if method.scheme in available:
             schemes.setdefault(method.scheme, []).append(method)
     with np.errstate(over="ignore", invalid="ignore"):  # runs that diverge do so on both sides

@@ -10,7 +10,7 @@ from edited import setup_of_file
 from trajectory_curves import FREE, HELD, run_of
 
 import tmt
-from compare.experiments.trajectory import errors, headline, runs
+from compare.experiments.trajectory import find_errors, headline, runs
 from compare.experiments.trajectory.runs import Path, TrajectoryResult
 from compare.judge.run import widest_judged
 from compare.robots.arm import ARM
@@ -117,7 +117,7 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
     free, held = run_of(FREE), run_of(HELD, 0.25, np.nan)
     free = replace(free, paths={"tmt": Path(q, q), "mujoco": Path(q + 100.0, q)})
     result = TrajectoryResult("trajectory", runs=[*others, free, held])
-    errors.find_errors(result, ARM, {FREE.name: reference(FREE)})
+    find_errors(result, ARM, {FREE.name: reference(FREE)})
     assert list(result.errors) == [HELD.name, FREE.name] and result.errors[HELD.name] == (0.25, None)
     assert result.answer.values["steps"] == 64
     differences = {scene["scene"]: scene["difference"] for scene in result.notes[-1].values["scenes"]}
