@@ -3,7 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import groupby
+from itertools import groupby, product
 
 import numpy as np
 
@@ -145,29 +145,22 @@ def cheapest(rows: Sequence[RunRow], target: float = math.inf, **where: object) 
 def what_to_use(result: SpeedResult) -> list[UseRow]:
     """For each scene and error the cheapest setting of each engine that has runs there, the cheapest engine first."""
     table = []
-    for scene in result.floors:
+    for scene, target in product(result.floors, TARGETS):
         rows = [row for row in result.rows if row.scene == scene and row.why_not is None]
         engines = dict.fromkeys(row.engine for row in rows)
-        for target in TARGETS:
-            best = {engine: cheapest(rows, target, engine=engine) for engine in engines}
-            least = min((row.time for row in best.values() if row), default=math.inf)
-            uses = [use_of(scene, target, engine, best[engine], rows, least) for engine in engines]
-            table += sorted(uses, key=lambda use: math.inf if use.ms is None else use.ms)
+        uses = [UseRow(scene=scene, target=target, engine=name, unit=result.unit) for name in engines]
+        best = [cheapest(rows, target, engine=use.engine) for use in uses]
+        least = min((row.time for row in best if row), default=math.inf)
+        for use, row in zip(uses, best):
+            if row is None:
+                continue
+            for name in OF_RUN:
+                setattr(use, name, getattr(row, name))
+            twin = same_scheme(rows, row)
+            use.ms, use.over_cheapest = 1e3 * row.time, row.time / least
+            use.over_same_scheme = row.time / twin.time if twin else None
+        table += sorted(uses, key=lambda use: math.inf if use.ms is None else use.ms)
     return table
-
-
-def use_of(
-    scene: str, target: float, engine: str, row: RunRow | None, rows: Sequence[RunRow], least: float
-) -> UseRow:
-    """The row of an engine's cheapest run; None: there is none. least: s, of all engines."""
-    use = UseRow(scene=scene, target=target, engine=engine, unit=rows[0].unit)
-    if row:
-        for name in OF_RUN:
-            setattr(use, name, getattr(row, name))
-        twin = same_scheme(rows, row)
-        use.ms, use.over_cheapest = 1e3 * row.time, row.time / least
-        use.over_same_scheme = row.time / twin.time if twin else None
-    return use
 
 
 def front(rows: Sequence[RunRow]) -> list[RunRow]:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from ..setup import Setup
 
 FEW, MANY = 1000, 100_000  # states of one call
 MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
-MOST_CALLS = 100_000  # repetitions in a timed call
+FIRST_CALLS, MOST_CALLS, TIMED = 4, 100_000, 1e-3  # repetitions in a timed call of about so many s
 FORWARD = "forward_dynamics"
 ONE_BY_ONE, SIDE_BY_SIDE = "compiled", "compiled, side by side"
 
@@ -65,30 +65,22 @@ def at_many_states(compiled: Evaluator, operations: int, *states: np.ndarray) ->
     out, ways = np.empty((len(states[0]), compiled.size)), []
     for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
         row = EvaluationRow(FORWARD, name, len(out), operations=operations)
-        ways.append(Loop(row, repeated(partial(compiled.fill, in_lanes, out, *states))))
+        ways.append(Loop(row, partial(repeat, partial(compiled.fill, in_lanes, out, *states))))
     return ways
 
 
-def repeated(call: Callable[[], object]) -> Callable[[int], None]:
-    def loop(count: int) -> None:
-        for _ in range(count):
-            call()
-
-    return loop
+def repeat(call: Callable[[], object], count: int) -> None:
+    for _ in range(count):
+        call()
 
 
 def costs(ready: Sequence[Loop], rounds: int) -> list[EvaluationRow]:
     """The rows of ways that are timed, the slowest first."""
-    counts = [repetitions(loop.run) for loop in ready]
-    calls: list[Callable[..., Any]] = [partial(loop.run, count) for loop, count in zip(ready, counts)]
+    some: list[Callable[[], object]] = [partial(loop.run, FIRST_CALLS) for loop in ready]
+    each = [min(seconds) / FIRST_CALLS for seconds in timing.in_turns(some, rounds)]
+    counts = [min(max(1, int(TIMED / seconds)), MOST_CALLS) for seconds in each]
+    calls: list[Callable[[], object]] = [partial(loop.run, count) for loop, count in zip(ready, counts)]
     for (row, _), count, seconds in zip(ready, counts, timing.in_turns(calls, rounds)):
         row.ns_per_state = 1e9 * min(seconds) / (count * row.states)
         row.operations_per_ns = row.operations and row.operations / row.ns_per_state
     return sorted((loop.row for loop in ready), key=lambda row: -(row.ns_per_state or 0.0))
-
-
-def repetitions(run: Callable[[int], object]) -> int:
-    """How often a loop repeats in about a millisecond."""
-    run(1)
-    (times,) = timing.in_turns([partial(run, 4)], 5)
-    return min(max(1, int(1e-3 / (min(times) / 4))), MOST_CALLS)

@@ -170,7 +170,7 @@ def measured(
     row = row_of(case, method, tolerance=setting.tolerance, evaluations=motion.evaluations)
     row.dt = setting.duration / setting.steps if setting.steps else None
     row.steps = setting.steps or motion.steps
-    row.seconds = next(s for s in (motion.seconds_alone, motion.seconds, seconds) if s is not None)
+    row.seconds = seconds if motion.seconds is None else motion.seconds
     row.compile_seconds = getattr(dynamics, "seconds_prepared", None) or prepared
     if at is not None:
         row.ended = str(motion.ended or f"diverged at {at:.2g} s")
@@ -208,7 +208,11 @@ def prepared(case: Case, row: RunRow, engines: Mapping[str, Engine]) -> tuple[Ca
 
 
 def take_times(case: Case, rows: Sequence[RunRow], engines: Mapping[str, Engine]) -> None:
-    """Set the seconds of rows to the least of their times; their runs take turns."""
+    """Set the seconds of rows to the least of their times; their runs take turns.
+
+    Engines in processes of their own have timed their runs there, without what it takes to ask them.
+    """
+    rows = [row for row in rows if not RECORDS[row.engine].reads_file]
     calls = [prepared(case, row, engines) for row in rows]
     for row, (_, factor), seconds in zip(rows, calls, timing.in_turns([call for call, _ in calls], ROUNDS)):
         row.seconds = factor * min(seconds)

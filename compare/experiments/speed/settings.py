@@ -6,7 +6,7 @@ from typing import NamedTuple
 from tmt import Tree
 from tmt.methods import method_named
 
-from ...engines import IN_QUICK_RUNS, RECORDS, Engine, Method, Setting, methods_in
+from ...engines import IN_QUICK_RUNS, RECORDS, Engine, Method, Setting
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import coarsest_steps
@@ -126,9 +126,8 @@ def methods(engines: Mapping[str, Engine], size: str, case: Case) -> list[Method
     """
     excluded, is_regular = left_out(engines, size, case.robot), case.name == regular_of(case.robot).name
     able = [engine for engine in asked(engines, size) if is_regular or not RECORDS[engine.name].reads_file]
-    found = [
-        method for engine in able if not engine.unavailable() for method in methods_in(engine, case).values()
-    ]
+    ready = [engine for engine in able if not engine.unavailable()]
+    found = [method for engine in ready for method in engine.methods_in(case).values()]
     return [method for method in found if (method.engine, method.name) not in excluded]
 
 

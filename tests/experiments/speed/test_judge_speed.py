@@ -172,7 +172,7 @@ class Slow:
         if method in self.refused:
             raise self.refused[method]
         states = np.tile(q, (GRID + 1, 1)), np.tile(v + 1.0, (GRID + 1, 1))  # it stays, and has an energy of motion
-        motion = Motion(np.linspace(0.0, 5.0, GRID + 1), *states, seconds_alone=self.seconds[setting.steps])
+        motion = Motion(np.linspace(0.0, 5.0, GRID + 1), *states, seconds=self.seconds[setting.steps])
         return lambda: None, lambda _: motion
 
 
@@ -222,6 +222,12 @@ def test_operations_per_nanosecond_are_those_of_a_state_over_its_time(monkeypatc
     (found,) = evaluations.costs([evaluations.Loop(row, lambda count: None)], 2)
     assert found.ns_per_state == pytest.approx(25.0)  # four calls of 10,000 states in a millisecond
     assert found.operations_per_ns == pytest.approx(133 / 25.0)
+
+
+def test_the_time_of_an_engine_in_a_process_of_its_own_is_that_which_it_has_measured_there():
+    found = [run_of("drake", "RK3", 1.0, seconds=1e-3)]
+    runs.take_times(HELD, found, {"drake": Slow({64: 9.0})})
+    assert found[0].seconds == 1e-3
 
 
 def test_a_row_gets_the_least_of_its_times(monkeypatch):
