@@ -26,23 +26,15 @@ from .features import feature_of_speeds
 from .readings import compare_numbers
 from .tables import AnswerRow, EngineRow, EnginesResult, ReadRow, RunRow
 
-EXPERIMENT = Experiment(
-    order=65,
-    serves_own=False,
-    asks_others=True,
-    quick_speeds=0,
-    options=("--engines",),
-    first_screen=("answer",),
-)
+EXPERIMENT = Experiment(order=65, serves_own=False, asks_others=True, quick_speeds=0, options=("--engines",),
+                        first_screen=("answer",))  # fmt: skip
 COMPARED = ("Mbar", "bias", "qdd")
 MOST_SHOWN = 12  # speeds of a robot whose state stands in the note of a check
-ITERATIONS, SLOW = (
-    (2, 4, 100),
-    20.0,
-)  # that are tried where a field differs; s of the processor, of a run that is slow
+ITERATIONS = 2, 4, 100  # that are tried where a field differs
+SLOW = 20.0  # s of the processor, of a run that is slow
 TABLES = "answer", "read", "runs"
 # of which nothing more is said; their names are kinds in the template
-NOT_ASKED = Unread, OtherJoints, OtherNames
+NOT_ASKED = Unread, OtherJoints, OtherNames, TooLong
 # s, of the first calls of an engine that compiles: so many, and per speed and pair of speeds; measured on two cores
 COMPILATION = 15.0, 1.0, 0.05
 
@@ -90,13 +82,8 @@ def is_same(answer: dict[str, Any]) -> bool | None:
 def add_answer(result: EnginesResult, setup: Setup, record: EngineRecord) -> None:
     """The row of an engine, and its sentence."""
     answer, label = result.answers[record.label], record.label
-    cells = {
-        cell: say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")
-    }
-    reads, equations, runs = cells.values()
-    row = AnswerRow(
-        engine=label, precision=record.precision, reads_the_file=reads, equations=equations, as_it_runs=runs
-    )
+    cells = [say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")]
+    row = AnswerRow(label, record.precision, *cells)
     result.tables["engines_answer"].append(row)
     setup.tell(say(result.finding("engine", row=row)))
 
@@ -120,10 +107,6 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
         answer["why_not"] = {"kind": kind, "reason": reason}
         result.tables["engines_read"].append(ReadRow(label, cause=cause, why_not=str(error)))
         result.find("not_asked", why=kind, engine=label, reason=reason, cause=cause)
-    except TooLong as error:
-        answer["why_not"] = {"kind": "TooLong", "reason": str(error)}
-        result.tables["engines_read"].append(ReadRow(label, why_not=str(error)))
-        result.find("not_asked", why="TooLong", engine=label, reason=str(error), cause=None)
     except EngineError as error:
         answer["why_not"] = {"kind": "EngineError", "reason": str(error)}
         result.check(label, ENDS, None, 0.0, "", str(error), rule="equal", about=About.ENGINE)
@@ -154,20 +137,12 @@ def compare_quantity(
     size = np.broadcast_to(quantity.size(scale, sample.tau, exact.high), values.shape)
     distance, tolerance = exact.distance(values), FACTOR * eps * size
     state, *entry = worst = closest(distance, tolerance)
-    numbers = {name: [repr(float(x)) for x in getattr(sample, name)[state]] for name in ("q", "qd", "tau")}
-    note = "; ".join(f"{argument} = ({', '.join(numbers[argument])})" for argument in quantity.arguments)
+    at = {name: [repr(float(x)) for x in getattr(sample, name)[state]] for name in ("q", "qd", "tau")}
+    note = "; ".join(f"{argument} = ({', '.join(at[argument])})" for argument in quantity.arguments)
     note = note if sample.tree.coordinates.nv <= MOST_SHOWN else sample.describe(state)
     unit = quantity.unit(sample.tree)
-    check = result.check(
-        record.label,
-        f"{name} to exact",
-        distance[worst],
-        tolerance[worst],
-        unit,
-        note,
-        True,
-        about=About.ENGINE,
-    )
+    numbers = distance[worst], tolerance[worst]
+    check = result.check(record.label, f"{name} to exact", *numbers, unit, note, True, about=About.ENGINE)
     names = Coordinates(sample.tree.joint_names, sample.tree.kind).speeds
     result.rows.append(EngineRow(
         engine=record.label, precision=record.precision, quantity=name, unit=unit, states=len(sample.q),
@@ -213,9 +188,8 @@ def add_runs(result: EnginesResult, setup: Setup, record: EngineRecord, dynamics
         more = more[-1:] if run.seconds > SLOW else more
     answer["runs"] = {"runs": runs, "unit": unit}
     for run in runs:
-        first: dict[str, Any] = (
-            {f"first_{name}": value for name, value in run.first._asdict().items()} if run.first else {}
-        )
+        fields = run.first._asdict() if run.first else {}
+        first: dict[str, Any] = {f"first_{name}": value for name, value in fields.items()}
         apart: dict[str, Any] = {f"apart_{steps}": run.apart.get(steps) for steps in (1, 10, 100)}
         result.tables["engines_runs"].append(RunRow(
             engine=record.label, iterations=run.iterations, ls_iterations=run.ls_iterations, own_settings=run is runs[0],

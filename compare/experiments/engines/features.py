@@ -60,17 +60,12 @@ def class_values(elements: Sequence[Any], kind: str, field: str, default: Any) -
 def classes_of_joints(spec: Spec) -> None:
     """What a class has of the outermost one is lost, as if the class had no <joint> of its own."""
     outermost = spec.default.joint
-    for field, default in (
-        ("axis", (0.0, 0.0, 1.0)),
-        ("pos", (0.0, 0.0, 0.0)),
-        *dict.fromkeys(PASSIVE, None).items(),
-    ):
+    for field in ("axis", "pos", *PASSIVE):
         for joint in [joint for joint in spec.joints if joint.classname.name != spec.default.name]:
-            of_class = getattr(joint.classname.joint, field)
-            if np.array_equal(of_class, getattr(outermost, field)) and np.array_equal(
-                of_class, getattr(joint, field)
-            ):
-                put([joint], **{field: default}) if default else zero([joint], field)
+            stated = [getattr(of, field) for of in (joint.classname.joint, outermost, joint)]
+            if all(np.array_equal(value, stated[0]) for value in stated):
+                zero([joint], field)
+                put([joint] * (field == "axis"), axis=(0.0, 0.0, 1.0))
 
 
 def undriven_armature(spec: Spec) -> None:

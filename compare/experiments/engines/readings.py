@@ -16,15 +16,8 @@ from ...robots import Robot
 from .features import Entry, causes_of
 from .tables import EnginesResult, ReadRow
 
-UNITS = {
-    "gravity": "m/s2",
-    "mass": "kg",
-    "com": "m",
-    "com_moved": "m",
-    "inertia": "kg m2",
-    "axis": "",
-    "anchor": "m",
-}
+UNITS = {"gravity": "m/s2", "mass": "kg", "com": "m", "com_moved": "m", "inertia": "kg m2", "axis": "",
+         "anchor": "m"}  # fmt: skip
 OF_SPEEDS = {"armature": {"rad": "kg m2", "m": "kg"}, "damping": {"rad": "N m s/rad", "m": "N s/m"},
              "stiffness": {"rad": "N m/rad", "m": "N/m"}}  # fmt: skip
 CHECKED = "mass", "inertia"  # no convention makes these differ
@@ -39,10 +32,8 @@ def compare_numbers(
     result: EnginesResult, robot: Robot, record: EngineRecord, file: File, reading: Reading
 ) -> None:
     """Rows of what an engine has read differently, and checks of the masses and inertias."""
-    label, rows = (
-        record.label,
-        [ReadRow(record.label, number, "joints", why_not=None) for number in reading.lacking],
-    )
+    label = record.label
+    rows = [ReadRow(label, number, "joints") for number in reading.lacking]
     for number in [number for number in CHECKED if number in reading.read]:
         largest = np.abs(reading.read[number] - reading.stated[number]).max(initial=0.0)
         bar = FACTOR * record.eps * size_of(reading.stated, number)
@@ -50,9 +41,8 @@ def compare_numbers(
     listed = [number for number in reading.differing if not {*FOLLOWS.get(number, ())} & {*reading.differing}]
     entries = [entry for number in listed for entry in differing(record, reading, number)]
     causes = causes_of(record, file, reading, entries) if entries else {}
-    is_meshed = bool(entries) and any(
-        any(meshes) for _, meshes in Source(file.path, file.floating).mesh_geoms
-    )
+    meshes = Source(file.path, file.floating).mesh_geoms if entries else ()
+    is_meshed = any(any(of_body) for _, of_body in meshes)
     for entry in entries:
         number, place = entry
         values, stated = (float(np.ravel(which[number])[place]) for which in (reading.read, reading.stated))

@@ -7,7 +7,7 @@ from ...core.check import Result
 from ...core.rows import MOVEMENT, MovementRow, Row, column
 
 
-@dataclass(kw_only=True)
+@dataclass
 class AnswerRow(Row):
     """An engine and its three answers, in words."""
 
@@ -70,6 +70,4 @@ class RunRow(MovementRow):
 
 @dataclass
 class EnginesResult(Result):
-    answers: dict[str, dict[str, Any]] = field(
-        default_factory=dict
-    )  # what cells of an AnswerRow say, by engine
+    answers: dict[str, dict[str, Any]] = field(default_factory=dict)  # what cells of an AnswerRow say, by engine

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from tmt import Tree
 from tmt.methods import method_named
 
 from ...engines import IN_QUICK_RUNS, RECORDS, Engine, Method, Setting
@@ -48,7 +47,7 @@ def budget(method: Method, robot: Robot, size: str) -> Budget:
         settings = FEW_OTHERS
     if method.adaptive or RECORDS[method.engine].reads_file:  # whose runs are timed one by one
         return Budget(settings, finest, LONGEST_CALLED)
-    step, solves = estimated(method, case.tree), solves_stages(method)
+    step, solves = estimated(method, n), method.engine == "tmt" and method_named(method.name).solves_stages
     if robot.is_read and (seconds := coarsest_steps(case) * step) > SLOWEST_RUN:
         return Budget(why_not=f"with {n} speeds its coarsest run would take about {seconds:.1g} s")
     if robot.is_read and size == "quick" and n > QUICK_SPEEDS and solves:
@@ -57,13 +56,8 @@ def budget(method: Method, robot: Robot, size: str) -> Budget:
     return Budget(settings, max(min(finest, int(most / step)), least), LONGEST_CALLED)
 
 
-def solves_stages(method: Method) -> bool:
-    return method.engine == "tmt" and method_named(method.name).solves_stages
-
-
-def estimated(method: Method, tree: Tree) -> float:
-    """Approximate seconds of a step."""
-    n = tree.coordinates.nv
+def estimated(method: Method, n: int) -> float:
+    """Approximate seconds of a step with n speeds."""
     is_called = method.engine not in SECONDS
     evaluation = SECONDS.get(method.engine, SECONDS["tmt"]) * n**1.5 + CALL_SECONDS * is_called
     if method.engine == "mujoco":

@@ -22,6 +22,6 @@ EDITS = (
     ("outside.as_it_runs", "one_run", "mujoco.mj_resetDataKeyframe(*_1)", "None", "a run begins at qpos0"),
     ("outside.as_it_runs", "fields", "sorted(contacts_of(d))", "list(contacts_of(d))", "contacts in another order differ"),
     ("timing", "is_timed", "scatter(taken) <= STEADY", "True", "one disturbed call is a time"),
-    ("engines.outside", "OutsideDynamics.acceleration", "tau - passive(*_1)", "tau", "damping is forgotten"),
+    ("engines.outside", "OutsideDynamics.at", "tau - passive(*_1)", "tau", "damping is forgotten"),
     ("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
 )  # fmt: skip
