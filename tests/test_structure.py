@@ -3,13 +3,10 @@
 import ast
 import re
 import sys
-from dataclasses import fields
 from functools import cache
 from graphlib import TopologicalSorter
 
 from runs import ROOT
-
-from compare.experiments import Functions
 
 FILES, OF_TMT = (sorted((ROOT / package).rglob("*.py")) for package in ("compare", "tmt"))
 DIAGRAM = re.compile(r"^  (\S+) --> (\S+)$", re.MULTILINE)
@@ -115,9 +112,3 @@ def test_the_diagram_shows_the_imports_of_all_folders():
         reached |= more
     assert imported <= reached, "arrows are missing"
     assert {a for a, b in reached if a == b} == {name for pair in FOR_DOCSTRINGS for name in pair}
-
-
-def test_no_module_of_an_experiment_hides_one_of_its_functions():
-    """Importing a submodule sets the package's attribute of that name."""
-    functions = {field.name for field in fields(Functions)}
-    assert not {path for path in FILES if path.stem in functions and path.parent.parent.name == "experiments"}

@@ -82,8 +82,7 @@ print(first, sources.own_sources(), len(list(store.cache_folder().glob("*.o"))))
 
 
 @pytest.mark.parametrize("change, kept", [
-    ("", 1), ("file.write_bytes(file.read_bytes() + b'# more')", 0), ("file.unlink()", 0), ("os.utime(file, ns=(0, 0))", 0),
-    ("tmt.model.lock.__loader__ = None", 0),
+    ("", 1), ("file.unlink()", 0), ("os.utime(file, ns=(0, 0))", 0), ("tmt.model.lock.__loader__ = None", 0),
 ])  # fmt: skip
 def test_what_is_compiled_is_kept_under_the_name_of_what_was_imported(change, kept, folder, tmp_path):
     """Of sources that are others by now, or gone, nothing is kept: the next process would run another version's code."""
