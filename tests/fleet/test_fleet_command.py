@@ -66,11 +66,12 @@ def test_a_file_has_the_report_that_it_has_alone(folder):
 def test_the_status_is_1_where_a_file_differs(folder, monkeypatch):
     said, words = [], ["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]
 
-    def carry_out(self, progress):
+    def carried_out(self):
         (model,) = self.models
         self.rows.append(FileRow(file=model.shown, verdict=said[-1], reason="no reason"))
+        return self.rows
 
-    monkeypatch.setattr("compare.fleet.run.Run.carry_out", carry_out)
+    monkeypatch.setattr("compare.fleet.run.Run.carried_out", carried_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
     for verdict, status in statuses.items():
         said.append(verdict)

@@ -72,8 +72,7 @@ def fleet(tmp_path, monkeypatch):
         options = FleetOptions(tuple(names), is_quick, reference, solution and str(solution.path.resolve()))
         executor = Inside(tmp_path / "places", answer)
         of = Run(found_models(paths)[0], options, executor, tmp_path / "out", solution)
-        of.carry_out(lambda rows: None)
-        rows = {os.path.basename(row.file): row for row in of.rows}
+        rows = {os.path.basename(row.file): row for row in of.carried_out()}
         verdicts = {name: row.verdict for name, row in rows.items()}
         return SimpleNamespace(of=of, executor=executor, rows=rows, verdicts=verdicts)
 
