@@ -102,19 +102,19 @@ def test_threads_change_no_bit(monkeypatch, rng):
 BALL, Z = one_body(np.eye(3), ["ball"], com=(0, 0, 0.1)), np.zeros(3)
 WRIST = dataclasses.replace(wrist(), inertia=[np.eye(3)])
 TURNS = np.array([[1.0, 0.0, 0.0, 0.0]] * 10)
-WRONG = {
-    "beyond the largest double": (tmt.ARM, (Z, np.full(3, 1e200), Z)),
-    "one of many is short": (BALL, (TURNS - np.eye(10)[:, :4] * [1.01e-6, 0, 0, 0], Z, Z)),
-    "singular except for rounding": (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z)),
-    "one of many singular": (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z)),
-}  # fmt: skip
+WRONG = [
+    (tmt.ARM, (Z, np.full(3, 1e200), Z), "beyond the largest double"),
+    (BALL, (TURNS - np.eye(10)[:, :4] * [1.01e-6, 0, 0, 0], Z, Z), "quaternion"),  # one of many is short
+    (WRIST, (np.array([0.3, np.pi, 0.7]), Z, Z), "'a', 'c'"),  # singular except for rounding
+    (WRIST, (np.eye(3)[[1, 1, 1, 2, 1]], Z, Z), "'a', 'c'"),  # one of many
+]
 
 
-@pytest.mark.parametrize("model, given", WRONG.values(), ids=WRONG)
-def test_machine_code_refuses_what_the_literal_form_refuses(model, given):
+@pytest.mark.parametrize("model, given, says", WRONG)
+def test_machine_code_refuses_what_the_literal_form_refuses(model, given, says):
     compiled(model, "acceleration", "mass_matrix")
     for acceleration in (literal.acceleration, tmt.acceleration):
-        with pytest.raises(ValueError, match="'a', 'c'" if model is WRIST else ""):
+        with pytest.raises(ValueError, match=says):
             acceleration(*given, model)
 
 
