@@ -6,6 +6,7 @@ import pytest
 from crane import crane
 
 import tmt
+from compare.engines import GRID, Setting
 from compare.engines.mujoco import calls, engine, parse, read
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
@@ -54,3 +55,13 @@ def test_forces_of_a_fluid_are_those_of_plain_mujoco(rng):
         plain.mj_forward(model, data)
         assert abs(data.qfrc_fluid[0]) > 1e-3 and found[0][k] == pytest.approx(data.qfrc_fluid, rel=1e-12)
     assert "fluid" in name and not np.any(found[1:])
+
+
+def test_a_prepared_run_ends_where_time_stands_still(engines):
+    """MuJoCo refuses an acceleration beyond 1e10 and takes no more steps: the last state, repeated, is no motion."""
+    dynamics, dt = engines["mujoco"].of(ARM.case()), 1.0 / 128
+    start = np.array([0.3, 0.2, 0.5]), np.zeros(3), np.full(3, 1e12)
+    whole, (run, read) = dynamics.run(*start, dt, GRID, "Euler"), dynamics.prepare(*start, Setting(0.5, GRID), "Euler")
+    found = read(run())
+    assert np.array_equal(found.q[0], start[0]) and np.isnan(found.q[1:]).all() and np.isnan(found.v[1:]).all()
+    assert np.isnan(whole.q[1:]).all() and found.ended == whole.ended and whole.ended.startswith("at t = 0 s")
