@@ -11,7 +11,6 @@ import pandas as pd
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from ..core.check import Check
 from ..core.rows import Row
 from ..core.text import block, count, environment
 from ..core.words import capital
@@ -81,7 +80,8 @@ class Document:
         """A line for each experiment, the pictures, and what explains that checks fail."""
         report = self.report
         failed = [check for kind in failures(report.sections) for check in kind]
-        failing = listing(failed, FIRST_CAUSES, ON_FIRST_SCREEN)._replace(title="Failing checks")
+        of_first = tables.of_checks(failed[:FIRST_CAUSES], ON_FIRST_SCREEN)
+        failing = Listing(len(failed), of_first, title="Failing checks")
         if report.causes:
             table = tables.of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank")
             title = "Cause" if len(report.causes) == 1 else "Causes"
@@ -113,7 +113,7 @@ class Document:
         first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
         first = [figure for figure in figures if figure in first or figure.moves]
         found = {"Failing checks": section.failed, "Not judged": not_judged}
-        lists = {label: listing(checks, MOST_ROWS) for label, checks in found.items()}
+        lists = {k: Listing(len(checks), tables.of_checks(checks[:MOST_ROWS])) for k, checks in found.items()}
         of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
         folded = [figure for figure in figures if figure not in first]
         return self.template.section(section, lists, of_section, first, folded)
@@ -145,10 +145,6 @@ def inside(folder: Path, image: re.Match[str]) -> str:
     """The attributes of a figure with its data."""
     data, width, height = embedded(folder / unescape(image[2]))
     return f'{image[1]}width="{width}" height="{height}" src="{data}"'
-
-
-def listing(checks: Sequence[Check], most: int, columns: Sequence[str] = tables.CHECK) -> Listing:
-    return Listing(len(checks), tables.of_checks(checks[:most], columns))
 
 
 def joints_of(robot: Robot) -> list[str]:
