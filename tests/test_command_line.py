@@ -127,7 +127,7 @@ def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(insid
         title, _, line = (out / "report.md").read_text(encoding="utf-8").splitlines()[:3]
         assert title.startswith("# ") and line == f'<p class="reference">{first}</p>'
         assert (out / "tables" / "inventory.csv").exists() == bool(asked)
-        assert ("mass (forearm)" in lines[-1]) == bool(status)  # the answer, after the verdict
+        assert ("mass (forearm)" in lines[-2]) == bool(status)  # the answer, after the verdict
         said = [line for line in lines if line.startswith("  CAUSE gravity z")]
         assert len(said) == status and all(0 < line.index("-9.81 ") < line.index("-9.8 ") for line in said)
 
@@ -158,7 +158,11 @@ def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(inside, tmp
     words = ["stability", "--quick", "--mjcf", str(path), "--out", str(out)]
     assert main(words) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith('Not stable: 2 ms with Euler, from "qpos0"') for line in lines)
+    first, *others, last = lines[lines.index("") + 1 :]  # the answer, then how many checks pass
+    assert first.startswith('Not stable: 2 ms with Euler, from "qpos0"') and last.startswith("Report: ")
+    assert "0 of 1 check passed." in others and not lines[0].startswith("reference:")
+    report = (out / "report.md").read_text(encoding="utf-8")
+    assert 0 < report.index("Not stable") < report.index("0 of 1 check")
     results = results_in(out)
     assert not results["passed"] and results["causes"] == []
     failed = [(check["quantity"], check["scene"]) for check in results["checks"] if not check["passed"]]

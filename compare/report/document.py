@@ -57,8 +57,9 @@ class Document:
     def text(self) -> str:
         """The whole document."""
         report, robot = self.report, self.report.robot
-        lines = report.verdict.split("\n")
-        parts = [self.template.head(self.title, report.first_lines, lines, report.top, report.passed)]
+        lines = report.verdict.split("\n"), report.top
+        first, *others = sum(reversed(lines) if report.answers_first else lines, list[str]())
+        parts = [self.template.head(self.title, report.first_lines, first, others, report.passed)]
         introduction = self.template.introduction(robot, robot.described or robot.name, joints_of(robot))
         parts += [self.first_screen(), " ".join(introduction.split())]
         if report.causes:

@@ -94,8 +94,13 @@ class Report(NamedTuple):
         return [say(text) for section in self.sections for text in section.result.top]
 
     @property
+    def answers_first(self) -> bool:
+        """Whether it answers one question about the robot: the answer comes before how many checks pass."""
+        return len(self.sections) == 1 and bool(self.sections[0].record.first_screen and self.top)
+
+    @property
     def answer(self) -> list[str]:
-        """The last lines of a run of one experiment: what is said of the robot, else its number."""
+        """The lines of a run of one experiment: what is said of the robot, else its number."""
         numbers = [headline(section) for section in self.sections if section.result.checks]
         lines = [line for section in self.sections for text in section.result.top for line in screen(text)]
         return lines or [f"{capital(number)}." for number in numbers if number]

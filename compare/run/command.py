@@ -61,20 +61,21 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
         raise Refused(f"{error}; {interrupt.Now.outcome}") from None
     except (ModelError, OwnError, SceneError) as error:
         raise Refused(str(error).replace(str(path), given)) from None
-    terminal.say()
-    terminal.say_lines(report.verdict.split("\n"), "bold green" if report.passed else "bold red")
     page, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
+    outcome, answer = report.verdict.split("\n"), report.answer if is_alone else []
+    parts = (answer, outcome) if report.answers_first else (outcome, answer)
+    terminal.say()
+    terminal.say_lines([line for part in parts for line in part], "bold green" if report.passed else "bold red")
     terminal.say(block("run", "report", path=page, seconds=seconds))
-    terminal.say_lines(report.answer if is_alone else ())
     if options.json:
-        answer = {
+        printed = {
             "passed": report.passed,
-            "verdict": report.verdict.split("\n"),
+            "verdict": outcome,
             "answer": report.answer,
             "causes": [cause.record() for cause in report.causes],
             "report": page,
         }
-        print(json.dumps(answer, indent=1), file=Stream(sys.stdout), flush=True)
+        print(json.dumps(printed, indent=1), file=Stream(sys.stdout), flush=True)
     if options.open:
         webbrowser.open((out / "index.html").as_uri())
     return 0 if report.passed else 1
@@ -86,7 +87,8 @@ def compute(
     """Run the experiments and write the report to a folder; see write_report."""
     is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
     request = compared.request_of(options)
-    terminal.say_lines(compared.reference.lines)
+    answers = is_alone and EXPERIMENTS[options.experiment].first_screen  # a question about the file as it is
+    terminal.say_lines(compared.reference.warned if answers else compared.reference.lines)
     if robot.coordinates.nv > MOST_SPEEDS:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
     names, reasons = applying([options.experiment] if is_alone else [*EXPERIMENTS], robot, options.engines)

@@ -65,9 +65,12 @@ class Reference(NamedTuple):
         """The first lines of the output and of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
         first = f"reference: {self.kind}; {self.file} compared with {other}"
-        warnings = [f"MuJoCo warns: {line}" for line in self.warnings]
-        lines = first, self.matched, *self.otherwise, *self.remarks, *warnings
-        return tuple(in_one_line(line) for line in lines if line)
+        lines = first, self.matched, *self.otherwise, *self.remarks
+        return *(in_one_line(line) for line in lines if line), *self.warned
+
+    @property
+    def warned(self) -> tuple[str, ...]:
+        return tuple(in_one_line(f"MuJoCo warns: {line}") for line in self.warnings)
 
 
 class Compared(NamedTuple):

@@ -125,10 +125,10 @@ def motion_of(
         return Motion(model, posture.name, state, controls)
     law = program(model, state[place], lengths, kp, kv)
     if law is None:
-        needed = (
-            "no motor" if kp is not None or kv is not None else "no servo: state --kp and --kv of its motors"
-        )
-        raise ValueError(f"it has {needed}")
+        if kp is None and kv is None:
+            raise ValueError("it has no servo: state --kp and --kv of its motors")
+        servos = program(model, state[place], lengths, None, None)
+        raise ValueError("it has no motor" + "; a program commands its servos without --kp and --kv" * bool(servos))
     mujoco.mj_fwdVelocity(stepper.model, stepper.data)
     ideal = Motion(model, posture.name, state.copy(), controls)
     if kp is not None or kv is not None:

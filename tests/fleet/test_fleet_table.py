@@ -124,6 +124,7 @@ def test_rows_are_in_their_order_in_the_csv_and_in_the_page(tmp_path):
             row(file="d.xml", same_as="c.xml", verdict=REFUSED)]  # fmt: skip
     summary = table.write_table(tmp_path, rows, [("early.xml", "because")], "the command")
     assert all(part in summary[0] for part in ("4 files", "1 copy", "1 was refused"))
+    assert f"<strong>{summary[0]}</strong>" in (tmp_path / "index.html").read_text()
     with (tmp_path / "fleet.csv").open(newline="") as file:
         found = list(csv.DictReader(file))
     assert [row["file"] for row in found] == ["b.xml", "d.xml", "c.xml", "a b.xml"]

@@ -47,7 +47,7 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
             (row.dt_s, row.apart) for row in mine if row.push_rad_per_s == own.push_rad_per_s and row.apart
         )
         if near:
-            right.plot(*zip(*near), **looks)
+            right.plot(*zip(*near), label=name, **looks)
     left.axhline(own.push_rad_per_s, color="black", linewidth=0.8, linestyle=":")
     left.set(xscale="log", yscale="log", xlabel="dt, s", ylabel=f"largest push that is survived, {own.unit}")
     right.set(xscale="log", yscale="log", xlabel="dt, s", ylabel="distance from fine steps, rad or m")
@@ -55,7 +55,9 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
         ax.axvline(own.file_dt_s, color="black", linewidth=0.8, linestyle=":")
     left.set_yticks(pushes, [f"{push:g}" for push in pushes])
     left.minorticks_off()
-    fig.legend(*left.get_legend_handles_labels(), loc="outside upper center", ncols=5)
+    handles = {line.get_label(): line for ax in (right, left) for line in ax.get_legend_handles_labels()[0]}
+    names = [name for name in LOOKS if name in handles]  # one without a push that is survived is on the right alone
+    fig.legend([handles[name] for name in names], names, loc="outside upper center", ncols=5)
     return "stability_steps", fig, caption(result, own, len(pushes))
 
 

@@ -57,12 +57,14 @@ def answer_of(task: tuple[Posture, Question], reading: Reading) -> Answer | str:
 
 def add(result: StabilityResult, work: Work) -> None:
     """Rows, checks, and what is said: the answer first, then what a user must know of it, what helps, the other postures."""
-    answers = list[Answer]()
+    answers, reasons = list[Answer](), dict[str, None]()
     for found in work.answers:
         if isinstance(found, str):
-            result.not_judged("", work.quantity, found, about=About.STEP)
+            reasons[found] = None
         else:
             answers.append(found)
+    for reason in reasons:  # once for all postures
+        result.not_judged("", work.quantity, reason, about=About.STEP)
     if not answers:
         return
     rows = [row for found in answers for row in found.rows]

@@ -54,6 +54,10 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
     tried = full.tables["stability_runs"]
     assert {row.push_rad_per_s for row in tried if row.posture == "home"} >= {0.03, 0.1, 0.3}
     names = [figure()[0] for figure in stability.figures(full, None)]
+    rows = [replace(row, outcome="moves") if row.integrator == "RK4" else row for row in tried]
+    of_none = replace(full, tables=full.tables | {"stability_runs": rows})  # RK4 survives no push
+    ((_, fig, _),) = [figure() for figure in stability.figures(of_none, None)]
+    assert {text.get_text() for text in fig.legends[0].texts} == set(INTEGRATORS)
     assert names == ["stability_steps"] == [figure()[0] for figure in stability.figures(found_of(), None)]
 
 
@@ -67,6 +71,14 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
 def test_the_step_that_is_asked_for_is_judged(dt, asked, quantity, passes):
     (check,) = found_of(dt=dt, **asked).checks
     assert (check.quantity, check.passed if check.judged else None) == (quantity, passes)
+
+
+@pytest.mark.parametrize("actuator, asked, servos", [
+    (SERVO, {"kp": 5.0}, True), ('<intvelocity joint="turn" kp="0"/>', {"kp": 5.0}, False), (MOTOR, {}, False)
+])  # fmt: skip
+def test_why_no_program_can_command_it_is_said_once_for_all_postures(actuator, asked, servos):
+    (check,) = found_of(actuator, alone=True, control_period=0.01, **asked).checks
+    assert not check.judged and ("without --kp" in check.note) == servos
 
 
 def test_the_posture_that_is_asked_for_is_the_start():
