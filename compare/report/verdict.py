@@ -96,7 +96,7 @@ class Report(NamedTuple):
     @property
     def answers_first(self) -> bool:
         """Whether it answers one question about the robot: the answer comes before how many checks pass."""
-        return len(self.sections) == 1 and bool(self.sections[0].record.first_screen and self.top)
+        return len(self.sections) == 1 and not self.sections[0].record.serves_own and bool(self.top)
 
     @property
     def answer(self) -> list[str]:

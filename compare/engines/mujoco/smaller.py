@@ -54,6 +54,7 @@ class Smaller:
     def whole(cls, source: Source, points: tuple[str, ...] = ()) -> "Smaller":
         """The whole file. points: see spec_with_points."""
         spec = spec_with_points(source, points)
+        spec.compiler.fusestatic = False  # as in the model that is read: states have the forces on each body
         first = cls(spec)
         for elements, kind in NAMED.items():
             for element in getattr(spec, elements):

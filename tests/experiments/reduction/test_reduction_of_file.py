@@ -323,6 +323,21 @@ def test_where_everything_moves_and_touches_nothing_is_left_out():
     assert "Everything is needed" in say(result.top[0]) and failed(result) == []
 
 
+FIXED = """<mujoco><compiler {0}/><worldbody><body name="foot" pos="0 0 1"><geom size="0.1" mass="3"/><body name="arm">
+<joint name="hinge" axis="0 1 0" damping="0.5"/><geom size="0.05" mass="0.4" pos="0.1 0 -0.3"/><body name="tool" pos="0 0 -0.5">
+<geom size="0.05" mass="0.2" pos="0.05 0 0"/></body></body></body></worldbody></mujoco>"""
+
+
+def test_bodies_that_are_fixed_to_others_may_be_fused_by_the_file(tmp_path):
+    turned = []
+    for fused in ("", 'fusestatic="true"'):
+        path = tmp_path / f"{len(turned)}.xml"
+        assert failed(answered(FIXED.format(fused), write=str(path))) == []
+        turned.append(run(path, "hinge", 250)[-1, 0])
+    assert turned[0] == pytest.approx(run(FIXED.format(""), "hinge", 250)[-1, 0], abs=1e-6)
+    assert turned[1] == pytest.approx(turned[0], abs=1e-6) and abs(turned[0]) > 0.05
+
+
 DAMPED = """<mujoco><option integrator="RK4" timestep="{}"/><worldbody><body><joint name="hinge" axis="0 1 0" damping="1"/>
 <geom size="0.05" mass="0.1" pos="0 0 -0.1"/></body></worldbody><keyframe><key name="down" qvel="{}"/></keyframe></mujoco>"""
 

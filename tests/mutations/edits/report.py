@@ -9,7 +9,7 @@ EDITS = (
     ("verdict", "verdict", "top.value", "True", "a difference of zero is the largest share of a tolerance"),
     ("verdict", "failures", "not check.judged", "False", "what was not judged does no harm"),
     ("verdict", "Section.judged", "check.judged", "True", "a check that was not judged compares something"),
-    ("verdict", "Report.answers_first", "self.sections[0].record.first_screen and self.top", "False", "the answer comes last"),
+    ("verdict", "Report.answers_first", "self.sections[0].record.serves_own", "True", "the answer comes last"),
     ("verdict", "outcome", "failures([section])", "failures([])", "a section whose checks fail passes"),
     ("questions", "largest", "max(rows, *_1)", "min(rows, *_1)", "the smallest difference is the answer"),
     ("questions", "largest", "row['largest_difference'] is None", "False", "a diverged run is an answer"),
