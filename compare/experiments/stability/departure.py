@@ -1,6 +1,7 @@
 """How long a held posture is kept: departure from a saddle after a small push or a small torque, in runs and predicted."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from itertools import product
 from typing import Any
 
@@ -8,12 +9,13 @@ import numpy as np
 
 from ...core.check import About, Result
 from ...engines import Engine, Method
-from ...judge.run import LEFT, departure
+from ...judge.run import LEFT, departure, number_or_none
 from ...stability.equilibrium import NEGLIGIBLE, Equilibrium
 from .subjects import mujoco_of, unit_of_movements
 from .tables import DepartureRow
 
 LONGEST_DEPARTURE = 12.0  # s
+AWAITED = 1.5  # times the latest departure that is predicted: so long is a run
 PERTURBATIONS = tuple(10.0**-k for k in (2, 4, 6, 8, 10, 12))  # rad, of the angles at the start
 # rad, as the error of torque that moves the equilibrium as far; less is a few ulps
 TORQUE_ERRORS = (1e-13, 1e-14, 3e-15)
@@ -21,26 +23,28 @@ DEPARTURE_TOLERANCE = 0.03  # s, or one step: how near the prediction an observe
 INSTANT = 1e-6  # s
 
 
-def predicted(at: Equilibrium, scheme: str, dt: float, moved: np.ndarray, off: np.ndarray) -> list[float | None]:
-    """When the method's own linear map has a joint 0.1 rad or m away, s, for each of many starts; None: not within 12 s.
+def predicted(
+    at: Equilibrium, schemes: Sequence[str], dt: float, moved: np.ndarray, off: np.ndarray
+) -> np.ndarray:
+    """When each method's own linear map has a joint 0.1 rad or m away, (methods, k) s; NaN: not within 12 s.
 
-    moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (k, n) N m. The map
-    carries all modes of the state about the equilibrium that this torque moves. Each new angle is rounded to a double, as in a
-    run, so that what a step adds may be lost; the rates are too small for that to matter.
+    moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (methods, k, n) N m.
+    The map carries all modes of the state about the equilibrium that this torque moves. Each new angle is rounded to a
+    double, as in a run, so that what a step adds may be lost; the rates are too small for that to matter.
     """
     n = at.nv
-    change = (at.step(scheme, dt) - np.eye(2 * n)).T
+    changes = np.array([(at.step(scheme, dt) - np.eye(2 * n)).T for scheme in schemes])
     # a torque along a mode without stiffness has no equilibrium, and is too small to matter
     compliance = np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2)
-    start, aside = at.sizes + moved, (compliance @ np.linalg.solve(at.mass_matrix, off.T)).T
-    q, qd = start.copy(), np.zeros_like(start)
-    times: list[float | None] = [None] * len(start)
+    aside = off @ (compliance @ np.linalg.inv(at.mass_matrix)).T - at.sizes
+    start = np.broadcast_to(at.sizes + moved, off.shape)
+    q, qd, times = start, np.zeros_like(start), np.full(off.shape[:-1], np.nan)
     for k in range(1, round(LONGEST_DEPARTURE / dt) + 1):
-        added = np.concatenate([q - at.sizes + aside, qd], axis=1) @ change
-        q, qd = q + added[:, :n], qd + added[:, n:]
-        gone = ~(np.abs(q - start).max(axis=1) <= LEFT)
-        times = [k * dt if time is None and out else time for time, out in zip(times, gone)]
-        if None not in times:
+        added = np.concatenate([q + aside, qd], axis=-1) @ changes
+        q, qd = q + added[..., :n], qd + added[..., n:]
+        gone = ~(np.abs(q - start).max(axis=-1) <= LEFT)
+        times[gone & np.isnan(times)] = k * dt
+        if gone.all():
             break
     return times
 
@@ -66,17 +70,20 @@ def departures(
     # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
     force = at.mass_matrix @ shape * rate.real**2
     errors = np.array([size * force * (not is_push) for size, is_push in sizes])
-    for method in (method for method in methods if is_led(at, method.scheme, dt)):
-        torques = own_torque(method, engines, at) + errors
-        expected = predicted(at, method.scheme, dt, moved, residual(method, engines, at, torques))
-        steps = round(LONGEST_DEPARTURE / dt)
+    led = [method for method in methods if is_led(at, method.scheme, dt)]
+    torques = [own_torque(method, engines, at) + errors for method in led]
+    off = np.array([residual(method, engines, at, tau) for method, tau in zip(led, torques)])
+    expected = predicted(at, [method.scheme for method in led], dt, moved, off.reshape(-1, *moved.shape))
+    for method, tau, times in zip(led, torques, expected):
+        longest = LONGEST_DEPARTURE if np.isnan(times).any() else min(LONGEST_DEPARTURE, AWAITED * times.max())
         with np.errstate(over="ignore", invalid="ignore"):
             dynamics = engines[method.engine].of(at.case)
-            motion = dynamics.run(at.moved(moved), np.zeros_like(moved), torques, dt, steps, method.name)
-        for (size, is_push), time, path in zip(sizes, expected, motion.q):
+            rest, steps = np.zeros_like(moved), math.ceil(longest / dt)
+            motion = dynamics.run(at.moved(moved), rest, tau, dt, steps, method.name)
+        for (size, is_push), time, path in zip(sizes, times, motion.q):
             rows.append(DepartureRow(
                 scene=at.name + ("" if is_push else ", torque off"), engine=method.engine, method=method.name,
-                dt=dt, perturbation=size, unit=unit_of_movements(robot), predicted=time,
+                dt=dt, perturbation=size, unit=unit_of_movements(robot), predicted=number_or_none(time),
                 observed=departure(motion.t, path, at.case.coordinates),
             ))  # fmt: skip
     return rows

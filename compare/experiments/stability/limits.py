@@ -1,6 +1,7 @@
 """Step limits: up to which dt a method keeps a small deviation small, predicted from one step and observed in runs."""
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ FAR = 1e4  # growth beyond which a motion is not linear any more
 GROWTH_MARGIN = 1e-3  # relative: from the second to the last quarter of a run; less is no growth
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
 # times the predicted limit; if there is none, the time in which the fastest mode moves: the observed one is sought among them
-TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.997, 1.004, 2.0]), np.array([0.1, 0.1, 1.0, 10.0])
+TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.9997, 1.0003, 2.0]), np.array([0.1, 0.1, 1.0, 10.0])
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
 KINDS = {"never_fails": "never fails", "always_fails": "fails at every step", "finite": "has a limit"}
@@ -35,23 +36,28 @@ class Observed(NamedTuple):
 def limit_rows(
     at: Equilibrium, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
 ) -> list[Observed]:
-    """The limits of one posture, predicted and observed."""
-    rows, fastest = [], np.abs(at.modes[0]).max()
+    """The limits of one posture, of each scheme predicted once, and of each method observed."""
+    found, fastest = [], np.abs(at.modes[0]).max()
+
+    @cache
+    def expected(scheme: str) -> tuple[str, float | None, float, float, np.ndarray]:
+        kind, limit = at.limit(scheme)
+        tolerance, tried = LIMIT_TOLERANCE, TRIED_OF_FASTEST / fastest
+        if limit:
+            tolerance, tried = limit_tolerance(at, scheme, limit, steps), limit * TRIED_ABOUT
+        # just above the limit its mode grows fastest
+        above = 1.001 * limit if limit else tried[0]
+        return kind, limit, fastest if kind == "never_fails" else at.growing_rate(scheme, above), tolerance, tried
+
     for method in methods:
-        kind, predicted = at.limit(method.scheme)
-        rate, tolerance, tried = fastest, LIMIT_TOLERANCE, TRIED_OF_FASTEST / fastest
-        if kind != "never_fails":  # just above the limit its mode grows fastest
-            rate = at.growing_rate(method.scheme, 1.001 * predicted if predicted else tried[0])
-        if predicted:
-            tolerance = limit_tolerance(at, method.scheme, predicted, steps)
-            tried = predicted * TRIED_ABOUT
+        kind, limit, rate, tolerance, tried = expected(method.scheme)
         seen, observed = observed_limit(method, engines, at, steps, tried)
         row = LimitRow(
             scene=at.name, engine=method.engine, method=method.name, damping=at.damping, mode=rate,
-            predicted_dt=predicted, observed_dt=observed, limit=kind,
+            predicted_dt=limit, observed_dt=observed, limit=kind,
         )  # fmt: skip
-        rows.append(Observed(row, seen, tolerance))
-    return rows
+        found.append(Observed(row, seen, tolerance))
+    return found
 
 
 def observed_limit(
@@ -59,10 +65,11 @@ def observed_limit(
 ) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run.
 
-    Upwards through `tried` to the first step that fails, then by bisection; ("never_fails", None) if none does,
-    ("always_fails", None) if the smallest does.
+    Between the second and the third of `tried`, by bisection, else down to the first or up to the last;
+    ("never_fails", None) if none fails, ("always_fails", None) if the smallest does.
     """
 
+    @cache
     def holds(dt: float) -> bool:
         return not grows(*shares(method, engines, at, dt, steps))
 
