@@ -82,6 +82,15 @@ def test_each_kind_of_failing_check_fails_the_verdict_and_only_the_models_disagr
     assert passed([section("stability", (*OWN_STEP[:2], 0.002, *OWN_STEP[3:]))])  # just stable
 
 
+@pytest.mark.parametrize("limit, said", [(0.00111, "limit: 1.11 ms"), (0.0, "no step is")])
+def test_a_step_that_is_not_stable_is_said_once_with_its_limit_if_there_is_one(limit, said):
+    of = section("stability")
+    of.result.check("home", *OWN_STEP[:2], limit, "s", "with Euler", about=About.STEP)
+    text = verdict([of], 1)
+    assert said in text and "2 ms" in text and ("limit:" in text) is bool(limit)
+    assert "stable at" not in outcome(of)  # the headline stands beside it
+
+
 def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to_agree():
     some, none = section("mass", GOOD), section("gravity")
     for result in (some.result, none.result):

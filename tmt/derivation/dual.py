@@ -97,6 +97,10 @@ def jacobian(
     return [list(row) for row in zip(*columns)]
 
 
+def values_of(numbers: Values) -> Values:
+    return [x.value if isinstance(x, Dual) else x for x in numbers]
+
+
 def unit_vectors(n: int) -> list[list[float]]:
     return [[1.0 if i == j else 0.0 for i in range(n)] for j in range(n)]
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tmt.derivation import composite, linearized
-from tmt.derivation.dual import Dual, seeded
+from tmt.derivation.dual import Dual, seeded, values_of
 from tmt.derivation.mechanism import AnyTree
 from tmt.derivation.quantities import Form, State
 from tmt.derivation.vectors import (
@@ -159,10 +159,6 @@ def jacobian_of_part(
     moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
     slopes = [np.broadcast_to(slope, (width, len(dt))) for slope in (*moved, *(x.slope for x in new_qd))]
     return np.array(slopes).transpose(2, 0, 1)
-
-
-def values_of(numbers: Values) -> Values:
-    return [x.value if isinstance(x, Dual) else x for x in numbers]
 
 
 def times(matrix: Rows, values: Values) -> Values:

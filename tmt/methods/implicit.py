@@ -16,7 +16,7 @@ from itertools import chain
 import numpy as np
 
 from tmt.derivation.coordinates import Coordinates, Joint, normalized, product
-from tmt.derivation.dual import Dual, jacobian, seeded, unit_vectors
+from tmt.derivation.dual import jacobian, seeded, unit_vectors, values_of
 from tmt.derivation.vectors import Scalar, Values, minus, plus, solve_any, weighted
 from tmt.methods.stepping import Numbers, Slope, State, Tableau
 
@@ -41,24 +41,26 @@ class ImplicitRungeKutta(Tableau):
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         """The state (q, qd) one dt later; ArithmeticError where Newton's method does not find the stages."""
 
+        start = values_of(q), values_of(qd)
+
         def linear(q_i: Values, qd_i: Values) -> Values:
             """The slope as it would be if it were linear, as at (q, qd)."""
-            x = seeded([*q, *qd], minus([*q_i, *qd_i], [*q, *qd]))
+            x = seeded([*start[0], *start[1]], minus([*q_i, *qd_i], [*start[0], *start[1]]))
             return [sum(x[0].parts(f)) for f in slope(x[: len(q)], x[len(q) :])]
 
-        def left_over(slope: Slope, a: Values) -> Values:
+        def left_over(slope: Slope, q: Values, qd: Values, a: Values) -> Values:
             slopes = [slope(*state) for state in self.stage_states(q, qd, dt, a, joints)]
             return minus(list(chain(*slopes)), a)
 
-        a, last = [0.0] * (len(qd) * self.stages), False
+        a, found = [0.0] * (len(qd) * self.stages), False
         for is_linear in (True, *[False] * ITERATIONS):
-            function = partial(left_over, linear if is_linear else slope)
-            matrix = [[x * -1.0 for x in row] for row in jacobian(function, a)]
-            change = solve_any(matrix, function(a))
+            function = partial(left_over, linear if is_linear else slope, *start)
+            matrix = [[x * -1.0 for x in values_of(row)] for row in jacobian(function, a)]
+            if found:  # once more: from this equation, with a constant matrix, the stages have their derivatives
+                return self.finish(q, qd, dt, plus(a, solve_any(matrix, left_over(slope, q, qd, a))), joints)
+            change = solve_any(matrix, values_of(function(a)))
             a = plus(a, change)
-            if last:  # once more after the values are found: only then are their derivatives exact
-                return self.finish(q, qd, dt, a, joints)
-            last = not is_linear and largest(change) <= CLOSE * (1.0 + largest(a))
+            found = not is_linear and largest(change) <= CLOSE * (1.0 + largest(a))
         raise ArithmeticError(f"Newton's method does not find the stages at dt = {dt} s")
 
     def stage_states(
@@ -108,8 +110,4 @@ def placed(joints: Coordinates, q: Values, moved: Values, balls: list[Values]) -
 
 
 def largest(values: Values) -> float:
-
-    def plain(value: Scalar) -> Scalar:
-        return plain(value.value) if isinstance(value, Dual) else np.max(np.abs(value))
-
-    return float(np.max([plain(value) for value in values]))
+    return float(np.max([np.max(np.abs(value)) for value in values]))

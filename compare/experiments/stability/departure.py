@@ -11,7 +11,7 @@ from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure, number_or_none
 from ...stability.equilibrium import NEGLIGIBLE, Equilibrium
-from .subjects import mujoco_of, unit_of_movements
+from .subjects import unit_of_movements
 from .tables import DepartureRow
 
 LONGEST_DEPARTURE = 12.0  # s
@@ -36,11 +36,11 @@ def predicted(
     changes = np.array([(at.step(scheme, dt) - np.eye(2 * n)).T for scheme in schemes])
     # a torque along a mode without stiffness has no equilibrium, and is too small to matter
     compliance = np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2)
-    aside = off @ (compliance @ np.linalg.inv(at.mass_matrix)).T - at.sizes
+    aside = np.linalg.solve(at.mass_matrix, off[..., None])[..., 0] @ compliance.T
     start = np.broadcast_to(at.sizes + moved, off.shape)
     q, qd, times = start, np.zeros_like(start), np.full(off.shape[:-1], np.nan)
     for k in range(1, round(LONGEST_DEPARTURE / dt) + 1):
-        added = np.concatenate([q + aside, qd], axis=-1) @ changes
+        added = np.concatenate([q - at.sizes + aside, qd], axis=-1) @ changes
         q, qd = q + added[..., :n], qd + added[..., n:]
         gone = ~(np.abs(q - start).max(axis=-1) <= LEFT)
         times[gone & np.isnan(times)] = k * dt
@@ -131,7 +131,7 @@ def own_torque(method: Method, engines: Mapping[str, Engine], at: Equilibrium) -
     residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
     """
     if method.engine == "mujoco":
-        return mujoco_of(engines, at.case).gravity_balance(at.q)
+        return engines["mujoco"].of(at.case).bias(at.q, np.zeros(at.nv))
     tau = variants(at.tau, 2)
     return tau[np.argmin(np.abs(residual(method, engines, at, tau)).max(axis=1))]
 

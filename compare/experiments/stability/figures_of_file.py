@@ -4,7 +4,6 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...core.finding import Finding
@@ -31,13 +30,8 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
     left, right = fig.subplots(1, 2)
     pushes = sorted({row.push_rad_per_s for row in tried})
     for name, (colour, dash, mark, width) in LOOKS.items():
-        looks: dict[str, Any] = {
-            "color": colour,
-            "linestyle": dash,
-            "linewidth": width,
-            "marker": mark,
-            "markersize": 4,
-        }
+        looks: dict[str, Any] = {"color": colour, "linestyle": dash, "linewidth": width, "marker": mark}
+        looks["markersize"] = 4
         mine = [row for row in tried if row.integrator == name]
         held = [(push, longest(mine, push)) for push in pushes]
         shown = [(step, push) for push, step in held if step]
@@ -64,13 +58,7 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
 def draw_bars(result: StabilityResult) -> tuple[str, Figure, Finding]:
     """The longest step of each integrator at the first posture."""
     rows, _ = first_posture(result)
-    fig, ax = chart()
-    bars_in(ax, rows)
-    return "stability_steps", fig, caption(result, rows[0], 1)
-
-
-def bars_in(ax: Axes, rows: list[StepLimitRow]) -> None:
-    own = rows[0]
+    (fig, ax), own = chart(), rows[0]
     least = min([own.fine_dt_s, *(row.stable_up_to_s or np.inf for row in rows)]) / 2.0
     for place, row in enumerate(rows):
         colour = LOOKS[row.integrator][0]
@@ -78,13 +66,11 @@ def bars_in(ax: Axes, rows: list[StepLimitRow]) -> None:
         ax.barh(place, step - least, left=least, height=0.6, color=colour)
         text = "none" if row.stable_up_to_s is None else " →" if row.fails_at_s is None else ""
         ax.text(step, place, f" {text}", va="center", fontsize=8, color=GREY)
-    named_rows(
-        ax,
-        [row.integrator for row in rows],
-        [row is not own or row.stable_at_file_dt is not False for row in rows],
-    )
+    passed = [row is not own or row.stable_at_file_dt is not False for row in rows]
+    named_rows(ax, [row.integrator for row in rows], passed)
     ax.axvline(own.file_dt_s, color="black", linewidth=0.8, linestyle=":")
     ax.set(xscale="log", xlim=(least, 0.3), xlabel="longest stable dt, s")
+    return "stability_steps", fig, caption(result, own, 1)
 
 
 def first_posture(result: StabilityResult) -> tuple[list[StepLimitRow], list[TriedRow]]:
@@ -96,15 +82,9 @@ def first_posture(result: StabilityResult) -> tuple[list[StepLimitRow], list[Tri
 
 def longest(rows: list[TriedRow], push: float) -> float | None:
     """The longest step below the shortest that fails after a push, s."""
-    failing = min(
-        (row.dt_s for row in rows if row.push_rad_per_s == push and row.outcome != "holds"), default=np.inf
-    )
-    holding = [
-        row.dt_s
-        for row in rows
-        if row.push_rad_per_s == push and row.outcome == "holds" and row.dt_s < failing
-    ]
-    return max(holding, default=None)
+    pushed = [row for row in rows if row.push_rad_per_s == push]
+    failing = min((row.dt_s for row in pushed if row.outcome != "holds"), default=np.inf)
+    return max((row.dt_s for row in pushed if row.dt_s < failing), default=None)
 
 
 def caption(result: StabilityResult, own: StepLimitRow, pushes: int) -> Finding:

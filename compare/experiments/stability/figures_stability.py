@@ -38,10 +38,7 @@ def look(name: str) -> tuple[str, Any, str]:
 
 
 def limits_in(
-    ax: Axes,
-    rows: Sequence[LimitRow],
-    known: Mapping[tuple[str, str], str],
-    most: int | None = None,
+    ax: Axes, rows: Sequence[LimitRow], known: Mapping[tuple[str, str], str], most: int | None = None
 ) -> list[Line2D]:
     """The limits of each scheme, predicted (line) and observed (mark); the handles of a legend. known: schemes of methods."""
     of_scheme: dict[str, list[LimitRow]] = {}

@@ -37,7 +37,7 @@ def limit_rows(
     at: Equilibrium, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
 ) -> list[Observed]:
     """The limits of one posture, of each scheme predicted once, and of each method observed."""
-    found, fastest = [], np.abs(at.modes[0]).max()
+    found, fastest = list[Observed](), np.abs(at.modes[0]).max()
 
     @cache
     def expected(scheme: str) -> tuple[str, float | None, float, float, np.ndarray]:
@@ -45,9 +45,10 @@ def limit_rows(
         tolerance, tried = LIMIT_TOLERANCE, TRIED_OF_FASTEST / fastest
         if limit:
             tolerance, tried = limit_tolerance(at, scheme, limit, steps), limit * TRIED_ABOUT
-        # just above the limit its mode grows fastest
-        above = 1.001 * limit if limit else tried[0]
-        return kind, limit, fastest if kind == "never_fails" else at.growing_rate(scheme, above), tolerance, tried
+        rate = fastest
+        if kind != "never_fails":  # just above the limit its mode grows fastest
+            rate = at.growing_rate(scheme, 1.001 * limit if limit else tried[0])
+        return kind, limit, rate, tolerance, tried
 
     for method in methods:
         kind, limit, rate, tolerance, tried = expected(method.scheme)
@@ -61,7 +62,7 @@ def limit_rows(
 
 
 def observed_limit(
-    method: Method, engines: Mapping[str, Engine], at: Equilibrium, steps: int, tried: Sequence[float]
+    method: Method, engines: Mapping[str, Engine], at: Equilibrium, steps: int, tried: np.ndarray
 ) -> tuple[str, float | None]:
     """The largest dt at which no mode of the equations of motion grows in a run.
 

@@ -90,9 +90,8 @@ def add(result: StabilityResult, work: Work) -> None:
     if first.rows[0].creep_rad_per_s > CREEPS:
         tell(result, "creep", row=first.rows[0], stops=first.stops)
     if others:
-        tell(
-            result, "others", rows=others, unstable=[row for row in others if row.stable_at_file_dt is False]
-        )
+        unstable = [row for row in others if row.stable_at_file_dt is False]
+        tell(result, "others", rows=others, unstable=unstable)
 
 
 def tell(result: StabilityResult, kind: str, **values: Any) -> None:
@@ -112,9 +111,8 @@ def check(result: StabilityResult, row: StepLimitRow, quantity: str) -> None:
     """The check of the step, or of the period, in use at a posture."""
     about, note = About.STEP, f"with {row.file_integrator}{', ' + row.moves_first if row.moves_first else ''}"
     if row.stable_at_file_dt is None:
-        why = (
-            "no fine run is finite" if not row.judged_by else "at fine steps the push is not survived either"
-        )
+        finite = "at fine steps the push is not survived either"
+        why = finite if row.judged_by else "no fine run is finite"
         result.not_judged(row.posture, quantity, why, "s", about=about)
         return
     used = row.period_s or row.file_dt_s

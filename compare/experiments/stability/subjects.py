@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...engines import Engine, Method, one_of_each_scheme, same_scheme
-from ...engines.mujoco.dynamics import MujocoDynamics
 from ...robots import Robot
 from ...robots.case import Case
 from ...stability.equilibrium import equilibrium, posture_names
@@ -53,12 +52,6 @@ def methods_of(
         for method in (*ours, *(one_of_each_scheme(mujoco) if schemes else mujoco.methods.values()))
         if not method.adaptive and (not schemes or method.scheme in schemes)
     )
-
-
-def mujoco_of(engines: Mapping[str, Engine], case: Case) -> MujocoDynamics:
-    dynamics = engines["mujoco"].of(case)
-    assert isinstance(dynamics, MujocoDynamics)
-    return dynamics
 
 
 def rk4_of_both(engines: Mapping[str, Engine]) -> tuple[Method, Method]:
