@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from edited import XML
+from in_process import without_workers
 from models import PATHS
 
 import tmt
@@ -101,3 +102,18 @@ def test_a_file_is_parsed_and_compiled_once(inside, tmp_path, counts, words):
     # iterparse: for pipes among the files that it includes, for which MuJoCo would wait
     again = words[0] == "parameters"  # without the options that change numbers
     assert counts == {"iterparse": 1, "from_file": 1, "compile": 1 + again}
+
+
+SWINGS = """<robot name="r"><link name="base"/><joint name="j" type="revolute"><parent link="base"/><child link="rod"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="5" velocity="5"/></joint><link name="rod"><inertial><mass value="{}"/>
+<origin xyz="0 0 -0.4"/><inertia ixx="0.02" iyy="0.02" izz="0.002" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>"""
+
+
+@pytest.mark.parametrize("mass, differs", [("2", False), ("1.5", True)])
+def test_a_urdf_is_a_solution_and_where_it_differs_no_eps_is_advised(tmp_path, capsys, mass, differs):
+    file, solution = written(tmp_path, SWINGS.format("2"), "a.urdf"), written(tmp_path, SWINGS.format(mass), "b.urdf")
+    asked = ["--mjcf", file, "--reference", solution, "--out", str(tmp_path / "out")]
+    with without_workers():
+        assert main(["derivatives", "--quick", *asked]) == differs
+    out = capsys.readouterr().out
+    assert ("Use mjd_transitionFD" in out) != differs and ("differ" in out) == differs

@@ -73,9 +73,9 @@ process_count = number("number of processes", 1, 1024, int)
 
 def stated_reference(text: str) -> str:
     """What a model is compared with; a text with a colon is read later."""
-    if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf")):
+    if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf", ".urdf")):
         return text
-    choices = "arm, model, FILE.xml, FILE.py:OBJECT or MODULE:OBJECT"
+    choices = "arm, model, FILE.xml or .urdf, FILE.py:OBJECT or MODULE:OBJECT"
     hint = expected(text, {"arm": "arm", "model": "model"}, choices)
     if text.endswith(".py"):
         hint = f"expected {text}: (all of it), or FILE.py:OBJECT"

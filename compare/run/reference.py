@@ -195,7 +195,7 @@ def with_arm(source: Source, path: str | None, shown: str) -> Compared:
 
 
 def is_solution(reference: str) -> bool:
-    return reference.lower().endswith((".xml", ".mjcf"))
+    return reference.lower().endswith((".xml", ".mjcf", ".urdf"))
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:
