@@ -126,11 +126,12 @@ def aligned(rows: Sequence[str]) -> list[str]:
         return []
     cells = [[cell.strip() for cell in row.strip().strip(ROW).split(ROW)] for row in rows]
     columns = list(zip_longest(*cells, fillvalue=""))
-    widths = [max(map(len, column)) for column in columns]
     to_left = [number == 0 or column[0].startswith("<") for number, column in enumerate(columns)]
+    columns = [(column[0].removeprefix("<").lstrip(), *column[1:]) for column in columns]
+    widths = [max(map(len, column)) for column in columns]
     made = [""]
     for row in zip(*columns):
-        texts = (cell.removeprefix("<").ljust(width) if left else cell.rjust(width)
+        texts = (cell.ljust(width) if left else cell.rjust(width)
                  for cell, width, left in zip(row, widths, to_left))  # fmt: skip
         made.append(f" {'   '.join(texts)}".rstrip())
     return made

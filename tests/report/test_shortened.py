@@ -178,7 +178,7 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
 
 
 def test_rows_of_a_table_are_aligned_after_an_empty_line():
-    rows = ["| model | error | <remark |", "| the file | - | |", "| x | 0.28 mm | the same bits |"]
+    rows = ["| model | error | < remark |", "| the file | - | |", "| x | 0.28 mm | the same bits |"]
     expected = [
         "",
         " model        error   remark",
