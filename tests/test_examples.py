@@ -16,6 +16,7 @@ from runs import ROOT
 import compare
 import tmt
 from compare.agreement import Difference
+from compare.fleet.models import place_of_report
 
 EXAMPLES = sorted((ROOT / "tests" / "examples").glob("*.py"))
 SLOW = {"many_files": pytest.mark.slow}  # which starts runs
@@ -27,7 +28,7 @@ EXPECTED = {
     "exported_c": (r"difference from tmt: \d(\.\d)?e-1\d|difference from tmt: 0$", {"arm.c", "arm.h", "arm.so"}),
     "many_files": (r"status 1.*\n.*ben.xml: differ com z of rod.*\n.*anna.xml: agree$",
                    {"class", "solution.xml", "submissions"}),
-    "marks": (r"anna.xml: 7 of 7\nben.xml: 3 of 7\ncopy.xml: 7 of 7\nbroken.xml: 0 of 7$", {"class"}),
+    "marks": (r"anna.xml: 7 of 7\n/submitted/ben.xml: 3 of 7\ncopy.xml: 7 of 7\nbroken.xml: 0 of 7$", {"class"}),
     "own_equations": (r"equations agree; .* h\[pole\] is .*\nprobable cause: gravity has the other sign in your h", set()),
     "stable_step": (r" Euler +2\.\d ms +\S+ ms +elbow\n.*fast +5\d ms(.*\n)+.* not stable\n.* elbow 8\.0: 0\.002", set()),
     "time_against_error": ("6 methods", {"time_against_error.png"}),
@@ -43,12 +44,13 @@ def write_fleet(folder):
         ("mass", "Mbar", True),
         ("gravity", "torque", True),
     )
-    for name, passes in {"anna.xml": True, "ben.xml": False}.items():
+    for name, passes in {"anna.xml": True, "/submitted/ben.xml": False}.items():
         found = [*checks[:1], ("parameters", "mass", passes), *checks[2:], ("mass", "other", passes)]
         fields = [dict(zip(("experiment", "quantity", "passed"), check)) for check in found]
-        (folder / "files" / name).mkdir(parents=True)
-        (folder / "files" / name / "results.json").write_text(json.dumps({"checks": fields}))
-    files = "anna.xml,", "ben.xml,", "copy.xml,anna.xml", "broken.xml,"
+        place = folder / place_of_report(name)
+        place.mkdir(parents=True)
+        (place / "results.json").write_text(json.dumps({"checks": fields}))
+    files = "anna.xml,", "/submitted/ben.xml,", "copy.xml,anna.xml", "broken.xml,"
     (folder / "fleet.csv").write_text("\n".join(["file,same_as", *files]))
 
 

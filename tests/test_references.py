@@ -116,4 +116,5 @@ def test_a_urdf_is_a_solution_and_where_it_differs_no_eps_is_advised(tmp_path, c
     with without_workers():
         assert main(["derivatives", "--quick", *asked]) == differs
     out = capsys.readouterr().out
+    assert "Not finished" not in out
     assert ("Use mjd_transitionFD" in out) != differs and ("differ" in out) == differs

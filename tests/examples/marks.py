@@ -6,12 +6,14 @@ import json
 import sys
 from pathlib import Path
 
+from compare.fleet.models import place_of_report
+
 POINTS = {"parameters": 4, "mass: Mbar": 2, "gravity": 1}  # of an experiment, or of one of its checks
 
 folder = Path(sys.argv[1])
 with open(folder / "fleet.csv", encoding="utf-8", newline="") as file:
     for row in csv.DictReader(file):
-        results = folder / "files" / (row["same_as"] or row["file"]) / "results.json"
+        results = folder / place_of_report(row["same_as"] or row["file"]) / "results.json"
         checks = json.loads(results.read_text(encoding="utf-8"))["checks"] if results.exists() else []
         points = 0
         for name, worth in POINTS.items():

@@ -119,4 +119,5 @@ def add_standing(result: Result, reading: Reading) -> None:
 def figures(result: Result, robot: Robot) -> Iterator[Drawing]:
     from .figures_derivatives import draw_errors  # matplotlib is for the process that draws
 
-    yield partial(draw_errors, result)
+    if any(text.kind == "answer" for text in result.top):
+        yield partial(draw_errors, result)
