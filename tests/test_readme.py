@@ -23,7 +23,7 @@ def test_it_is_short_and_has_all_that_it_links():
     assert BLOCKS and {language for language, _ in BLOCKS} <= {"python", "sh", "text", "toml"}
     assert len(BLOCKS) == README.count("\n```") / 2 and len(README.splitlines()) <= 150
     linked = re.findall(r"\]\(([^)]+)\)", README)
-    assert len([name for name in linked if name.endswith((".png", ".gif"))]) == 3
+    assert len([name for name in linked if name.endswith((".png", ".gif"))]) == 2
     assert all((ROOT / name).exists() for name in linked)
 
 

@@ -172,9 +172,14 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
         ax.set_xlabel("torque within one ulp" if claim == 1 else "dt, s")
         ax.set_ylabel("largest movement, rad" if claim == 3 else f"time until a movement of {LEFT:g} rad, s")
         ax.set(xscale="linear" if claim == 1 else "log", yscale="log" if claim == 3 else "linear")
+        if claim == 3:
+            lost = [row.dt for row in rows if row.claim == claim and row.diverged_at is not None]
+            ax.plot(lost, [1.0] * len(lost), "x", color="black", label="diverges")
+            ax.set_xticks((0.3, 0.4, 0.6, 1.0), ("0.3", "0.4", "0.6", "1"))
+            ax.minorticks_off()
     for engine in dict.fromkeys(row.engine for row in rows):
         fill = "full" if engine == "tmt" else "none"
         axes[0].plot([], [], "^", color=COLOURS[engine], fillstyle=fill, label=LABELS[engine])
-    fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
+    fig.legend(loc="outside upper center", ncols=3, fontsize=8)
     about = {"dt": fraction(claims.duration, claims.dt), "joint": robot.joints[0], "posture": claims.left, "kept": claims.kept}
     return "stability_claims", fig, result.finding("figure_claims", **about, panels=len(found))
