@@ -52,7 +52,9 @@ OTHERWISE = {  # how, the file, and what is said
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name, reference", [*((name, "arm") for name in OTHERWISE), ("turned", str(ARM.mjcf))])
+@pytest.mark.parametrize(
+    "name, reference", [*((name, "arm") for name in OTHERWISE), ("turned", str(ARM.mjcf))]
+)
 def test_what_moves_as_stated_is_compared_in_its_place_and_said_to_be_otherwise(name, reference, tmp_path):
     text, says = OTHERWISE[name]
     (tmp_path / "file.xml").write_text(text)

@@ -111,7 +111,10 @@ SWINGS = """<robot name="r"><link name="base"/><joint name="j" type="revolute"><
 
 @pytest.mark.parametrize("mass, differs", [("2", False), ("1.5", True)])
 def test_a_urdf_is_a_solution_and_where_it_differs_no_eps_is_advised(tmp_path, capsys, mass, differs):
-    file, solution = written(tmp_path, SWINGS.format("2"), "a.urdf"), written(tmp_path, SWINGS.format(mass), "b.urdf")
+    file, solution = (
+        written(tmp_path, SWINGS.format("2"), "a.urdf"),
+        written(tmp_path, SWINGS.format(mass), "b.urdf"),
+    )
     asked = ["--mjcf", file, "--reference", solution, "--out", str(tmp_path / "out")]
     with without_workers():
         assert main(["derivatives", "--quick", *asked]) == differs

@@ -142,7 +142,9 @@ class Model(ReadModel):
         blocks = self.newton.eval_mass_matrix(self.model, self.state).numpy()
         M = block_diag(*(block[:size, :size] for block, size in zip(blocks, sizes))).astype(float)
         weight, rest = self.model.state().joint_qd, self.model.state().joint_qd
-        self.newton.eval_inverse_dynamics_passive(self.model, self.state, gravity_force=weight, coriolis_force=rest)
+        self.newton.eval_inverse_dynamics_passive(
+            self.model, self.state, gravity_force=weight, coriolis_force=rest
+        )
         h = weight.numpy().astype(float) + rest.numpy() + M @ at.c
         self.start(at, 1.0, None)
         return M, h, self.reached(force)[1] - at.u

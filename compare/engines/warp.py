@@ -82,7 +82,10 @@ class Model(OfCompiled):
         forward = self.replay("forward", lambda data: self.engine.forward(self.undamped, data))
         self.place(at.x, at.u, force)
         forward()
-        M, row = np.zeros((at.u.size, at.u.size)), np.repeat(np.arange(at.u.size), self.undamped.M_rownnz.numpy())
+        M, row = (
+            np.zeros((at.u.size, at.u.size)),
+            np.repeat(np.arange(at.u.size), self.undamped.M_rownnz.numpy()),
+        )
         column, data = self.undamped.M_colind.numpy(), self.data
         M[row, column] = M[column, row] = data.M.numpy()[0]  # the lower triangle, row by row
         return M, data.qfrc_bias.numpy()[0].copy(), data.qacc.numpy()[0].copy()

@@ -65,7 +65,9 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     outcome, answer = report.verdict.split("\n"), report.answer if is_alone else []
     parts = (answer, outcome) if report.answers_first else (outcome, answer)
     terminal.say()
-    terminal.say_lines([line for part in parts for line in part], "bold green" if report.passed else "bold red")
+    terminal.say_lines(
+        [line for part in parts for line in part], "bold green" if report.passed else "bold red"
+    )
     terminal.say(block("run", "report", path=page, seconds=seconds))
     if options.json:
         printed = {

@@ -128,7 +128,9 @@ def motion_of(
         if kp is None and kv is None:
             raise ValueError("it has no servo: state --kp and --kv of its motors")
         servos = program(model, state[place], lengths, None, None)
-        raise ValueError("it has no motor" + "; a program commands its servos without --kp and --kv" * bool(servos))
+        raise ValueError(
+            "it has no motor" + "; a program commands its servos without --kp and --kv" * bool(servos)
+        )
     mujoco.mj_fwdVelocity(stepper.model, stepper.data)
     ideal = Motion(model, posture.name, state.copy(), controls)
     if kp is not None or kv is not None:

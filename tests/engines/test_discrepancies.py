@@ -14,7 +14,9 @@ from compare.engines.outside import Outside
 TEXT = Path(__file__).parents[2] / "reports/engines/discrepancies.md"
 BLOCK = re.compile(r"^## (.*?)$(?:(?!^## ).)*?^```python\n(.*?)^```\n\n```text\n(.*?)^```$", re.M | re.S)
 BLOCKS = BLOCK.findall(TEXT.read_text())
-PACKAGES = {"pydrake": "drake", "mujoco_warp": "warp"} | {name: name for name in ("newton", "pinocchio", "mjx")}
+PACKAGES = {"pydrake": "drake", "mujoco_warp": "warp"} | {
+    name: name for name in ("newton", "pinocchio", "mjx")
+}
 # what engines themselves print is left out
 RUN = """import functools, sys
 with open(sys.argv[2], "w") as out:

@@ -61,7 +61,12 @@ def test_a_prepared_run_ends_where_time_stands_still(engines):
     """MuJoCo refuses an acceleration beyond 1e10 and takes no more steps: the last state, repeated, is no motion."""
     dynamics, dt = engines["mujoco"].of(ARM.case()), 1.0 / 128
     start = np.array([0.3, 0.2, 0.5]), np.zeros(3), np.full(3, 1e12)
-    whole, (run, read) = dynamics.run(*start, dt, GRID, "Euler"), dynamics.prepare(*start, Setting(0.5, GRID), "Euler")
+    whole, (run, read) = (
+        dynamics.run(*start, dt, GRID, "Euler"),
+        dynamics.prepare(*start, Setting(0.5, GRID), "Euler"),
+    )
     found = read(run())
-    assert np.array_equal(found.q[0], start[0]) and np.isnan(found.q[1:]).all() and np.isnan(found.v[1:]).all()
+    assert (
+        np.array_equal(found.q[0], start[0]) and np.isnan(found.q[1:]).all() and np.isnan(found.v[1:]).all()
+    )
     assert np.isnan(whole.q[1:]).all() and found.ended == whole.ended and whole.ended.startswith("at t = 0 s")

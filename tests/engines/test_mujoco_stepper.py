@@ -84,7 +84,9 @@ def test_inputs_of_a_roll_are_those_of_a_program_in_plain_steps():
 
 
 def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():
-    text = HINGE.format('<general joint="j" biastype="affine" biasprm="0 1e6 0"/>', '<key name="k" qpos="1"/>')
+    text = HINGE.format(
+        '<general joint="j" biastype="affine" biasprm="0 1e6 0"/>', '<key name="k" qpos="1"/>'
+    )
     stepper = Stepper(mujoco.MjModel.from_xml_string(text), 1.0, "Euler")
     start, speed, count = stepper.start("k", controls=[0.0]), 0.0, 0
     q = 1.0
@@ -184,7 +186,12 @@ STARTS = {  # actuators, what the keyframe states; the control and the activatio
     "a filter": (SERVO.format('timeconst="0.1"'), "", 0.4, 0.4),
     "a filter that is stated": (SERVO.format('timeconst="0.1"'), 'ctrl="0.7" act="0.2"', 0.7, 0.2),
     "an integrator": ('<intvelocity joint="j" kp="9" actrange="-1 1"/>', "", 0.0, 0.4),
-    "an integrator that is stated": ('<intvelocity joint="j" kp="9" actrange="-1 1"/>', 'act="0.1"', 0.0, 0.1),
+    "an integrator that is stated": (
+        '<intvelocity joint="j" kp="9" actrange="-1 1"/>',
+        'act="0.1"',
+        0.0,
+        0.1,
+    ),
     "a motor": ('<motor joint="j"/>', "", 0.0, None),
     "a velocity servo": ('<velocity joint="j" kv="2"/>', "", 0.0, None),
     "a muscle": ('<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/>', "", 0.0, 0.0),
@@ -235,7 +242,12 @@ def test_kv_of_every_servo_and_damper_changes_and_its_target_does_not(actuator, 
 FACTOR = 5.0
 CONTACTS = {  # option, geoms, pair; whether there is a time constant to change
     "of geoms": ("", 'solref="0.01 1"', "", True),
-    "of a pair": ("", 'contype="0" conaffinity="0"', '<pair geom1="ball" geom2="floor" solref="0.01 1"/>', True),
+    "of a pair": (
+        "",
+        'contype="0" conaffinity="0"',
+        '<pair geom1="ball" geom2="floor" solref="0.01 1"/>',
+        True,
+    ),
     "of the options": ('o_solref="0.01 1"><flag override="enable"/></option><option', "", "", True),
     "by stiffness and damping": ("", 'solref="-1000 -50"', "", False),
 }

@@ -41,7 +41,9 @@ def near(values, expected):
 
 
 TREE = tree_of_kinds(np.random.default_rng(3))
-CHAIN = one_body([*UNIT, (0, 1, 0), (1, 0, 0)], ("ball", "slide", "hinge"), (0.3, 0.2, 0.1), stiffness=(2.0, 3.0, 0.0))
+CHAIN = one_body(
+    [*UNIT, (0, 1, 0), (1, 0, 0)], ("ball", "slide", "hinge"), (0.3, 0.2, 0.1), stiffness=(2.0, 3.0, 0.0)
+)
 
 
 @pytest.mark.parametrize("name", PLAIN)
@@ -53,7 +55,9 @@ def test_python_gives_the_same_values(name):
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")
 @pytest.mark.parametrize("single", [False, True])
-def test_c_compiles_without_a_warning_and_gives_the_same_values_in_any_number_of_parts(single, tmp_path, monkeypatch):
+def test_c_compiles_without_a_warning_and_gives_the_same_values_in_any_number_of_parts(
+    single, tmp_path, monkeypatch
+):
     """Values that parts hand on stand in an array whose places are used again."""
     kind, (rtol, atol) = (np.float32, (2e-3, 1e-4)) if single else (np.float64, (1e-11, 1e-12))
     states, results = [x[0].astype(kind) for x in states_of(TREE)], []

@@ -56,7 +56,9 @@ class ImplicitRungeKutta(Tableau):
         for is_linear in (True, *[False] * ITERATIONS):
             function = partial(left_over, linear if is_linear else slope, *start)
             matrix = [[x * -1.0 for x in values_of(row)] for row in jacobian(function, a)]
-            if found:  # once more: from this equation, with a constant matrix, the stages have their derivatives
+            if (
+                found
+            ):  # once more: from this equation, with a constant matrix, the stages have their derivatives
                 return self.finish(q, qd, dt, plus(a, solve_any(matrix, left_over(slope, q, qd, a))), joints)
             change = solve_any(matrix, values_of(function(a)))
             a = plus(a, change)

@@ -67,7 +67,9 @@ def read(name: str, file: File, tree: tmt.Tree) -> tuple[ReadModel, Reading]:
     for number in differing:
         if number not in OF_BODIES:
             model.set(number, stated[number])
-    if {*differing} & {*OF_BODIES}:  # where places alone differ, bodies are displaced, and their mass is right
+    if {*differing} & {
+        *OF_BODIES
+    }:  # where places alone differ, bodies are displaced, and their mass is right
         moments = (np.linalg.eigvalsh(values["inertia"]) for values in (numbers, stated))
         off = np.abs(np.subtract(*moments)).max(axis=1) / size_of(stated, "inertia")
         off = np.maximum(off, np.abs(numbers["mass"] - stated["mass"]) / size_of(stated, "mass"))

@@ -70,4 +70,6 @@ class RunRow(MovementRow):
 
 @dataclass
 class EnginesResult(Result):
-    answers: dict[str, dict[str, Any]] = field(default_factory=dict)  # what cells of an AnswerRow say, by engine
+    answers: dict[str, dict[str, Any]] = field(
+        default_factory=dict
+    )  # what cells of an AnswerRow say, by engine

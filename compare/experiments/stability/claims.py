@@ -71,7 +71,9 @@ def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None
         mine = [row for row in torques if row.engine == engine]
         (own,) = (row for row in mine if row.torque == NEAREST)
         rows, where = [row for row in mine if row is not own], f"{claims.left}, {LABELS[engine]} {method}"
-        if engine == "mujoco":  # of TMT no double need be the bias: compiled code rounds its last sum only once
+        if (
+            engine == "mujoco"
+        ):  # of TMT no double need be the bias: compiled code rounds its last sum only once
             quantity = "movement under the engine's own bias"
             check = result.check(where, quantity, own.moved, 0.0, "rad", about=About.PREDICTION)
             reproduced &= check.passed
@@ -137,7 +139,10 @@ def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -
     """Claim 3: RK4 at the posture that is kept, below and beyond its limit, the torque one ulp off."""
     at, rows = equilibrium(robot, claims_of(robot).kept), list[ClaimRow]()
     for method in rk4_of_both(engines):
-        tau, dynamics = np.nextafter(own_torque(method, engines, at), np.inf), engines[method.engine].of(at.case)
+        tau, dynamics = (
+            np.nextafter(own_torque(method, engines, at), np.inf),
+            engines[method.engine].of(at.case),
+        )
         for dt in STEPS_BEYOND:
             with np.errstate(over="ignore", invalid="ignore"):
                 motion = dynamics.run(at.q, np.zeros_like(at.q), tau, dt, steps, method.name)
@@ -153,7 +158,9 @@ def accelerations_at_end(robot: Robot, engines: Mapping[str, Engine]) -> dict[st
     """The largest acceleration at the claimed end under the torque that holds the other posture, rad/s2, by engine."""
     at, q = equilibrium(robot, claims_of(robot).kept), robot.posture(claims_of(robot).end)
     of = {LABELS[method.engine]: engines[method.engine].of(at.case) for method in rk4_of_both(engines)}
-    return {label: float(np.abs(one.acceleration(q, np.zeros_like(q), at.tau)).max()) for label, one in of.items()}
+    return {
+        label: float(np.abs(one.acceleration(q, np.zeros_like(q), at.tau)).max()) for label, one in of.items()
+    }
 
 
 def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping[str, float]) -> None:
@@ -165,7 +172,10 @@ def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping
     for row in (row for row in rows if row.dt < limit):
         where = f"{claims.kept}, {row.who}, dt = {row.dt:.4g} s, torque {row.torque}"
         run = row.run or 0.0
-        time, what = run if row.observed is None else row.observed, f"time within {LEFT:g} rad, below the limit"
+        time, what = (
+            run if row.observed is None else row.observed,
+            f"time within {LEFT:g} rad, below the limit",
+        )
         stays &= result.check(where, what, time, run, "s", rule="at least", about=about).passed
     for label, size in ends.items():
         where = f"{claims.end}, {label}"

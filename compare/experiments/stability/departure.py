@@ -75,7 +75,9 @@ def departures(
     off = np.array([residual(method, engines, at, tau) for method, tau in zip(led, torques)])
     expected = predicted(at, [method.scheme for method in led], dt, moved, off.reshape(-1, *moved.shape))
     for method, tau, times in zip(led, torques, expected):
-        longest = LONGEST_DEPARTURE if np.isnan(times).any() else min(LONGEST_DEPARTURE, AWAITED * times.max())
+        longest = (
+            LONGEST_DEPARTURE if np.isnan(times).any() else min(LONGEST_DEPARTURE, AWAITED * times.max())
+        )
         with np.errstate(over="ignore", invalid="ignore"):
             dynamics = engines[method.engine].of(at.case)
             rest, steps = np.zeros_like(moved), math.ceil(longest / dt)
@@ -96,7 +98,10 @@ def check_departures(result: Result, rows: list[DepartureRow]) -> None:
         off, size = late(row), f"{row.perturbation:.0e} {row.unit}"
         missing = {"the run stays": row.observed, "the prediction stays": row.predicted}
         note = " and ".join(text for text, time in missing.items() if time is None)
-        where, quantity = f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {size}", "departure, observed - predicted"
+        where, quantity = (
+            f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {size}",
+            "departure, observed - predicted",
+        )
         value = None if off is None else abs(off)
         result.check(where, quantity, value, near(row), "s", note, about=About.PREDICTION)
 

@@ -50,7 +50,9 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
     left.set_yticks(pushes, [f"{push:g}" for push in pushes])
     left.minorticks_off()
     handles = {line.get_label(): line for ax in (right, left) for line in ax.get_legend_handles_labels()[0]}
-    names = [name for name in LOOKS if name in handles]  # one without a push that is survived is on the right alone
+    names = [
+        name for name in LOOKS if name in handles
+    ]  # one without a push that is survived is on the right alone
     fig.legend([handles[name] for name in names], names, loc="outside upper center", ncols=5)
     return "stability_steps", fig, caption(result, own, len(pushes))
 

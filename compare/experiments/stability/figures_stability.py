@@ -161,7 +161,10 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
             if row.claim == claim and row.torque != NEAREST:
                 series.setdefault((row.engine, row.ulps or 0), []).append(row)
         for (engine, sign), mine in series.items():
-            looks: dict[str, Any] = {"color": COLOURS[engine], "fillstyle": "full" if engine == "tmt" else "none"}
+            looks: dict[str, Any] = {
+                "color": COLOURS[engine],
+                "fillstyle": "full" if engine == "tmt" else "none",
+            }
             where = range(1, len(mine) + 1) if claim == 1 else [row.dt for row in mine]
             values = [number_or_nan(row.moved if claim == 3 else row.observed) for row in mine]
             if claim == 2:
@@ -181,5 +184,10 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
         fill = "full" if engine == "tmt" else "none"
         axes[0].plot([], [], "^", color=COLOURS[engine], fillstyle=fill, label=LABELS[engine])
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    about = {"dt": fraction(claims.duration, claims.dt), "joint": robot.joints[0], "posture": claims.left, "kept": claims.kept}
+    about = {
+        "dt": fraction(claims.duration, claims.dt),
+        "joint": robot.joints[0],
+        "posture": claims.left,
+        "kept": claims.kept,
+    }
     return "stability_claims", fig, result.finding("figure_claims", **about, panels=len(found))

@@ -23,7 +23,13 @@ STOPPED = "smallest error of mujoco's RK4, where smaller steps gain nothing"
 def run_of(engine, method, error, steps=64, seconds=1e-3, **more) -> RunRow:
     """A run: diverged where the error is None."""
     errors = dict.fromkeys(("error", "worst_error", "early_error", "energy_error"), error)
-    about = {"scene": "bent, free", "engine": engine, "method": method, "scheme": SCHEMES.get(method, method), "order": 4}
+    about = {
+        "scene": "bent, free",
+        "engine": engine,
+        "method": method,
+        "scheme": SCHEMES.get(method, method),
+        "order": 4,
+    }
     numbers = {"dt": 5.0 / steps, "evaluations": 4 * steps, "seconds": seconds}
     numbers |= dict.fromkeys(("steps", "timed_steps"), steps)
     return RunRow(**about | errors | numbers | {"ended": None if error else "diverged"} | more)
@@ -153,7 +159,10 @@ def test_the_cheapest_setting_of_each_engine_for_an_error():
     "error, target, reaches", [(1e-6, 1e-6, True), (1.01e-6, 1e-6, False), (None, 1.0, False)]
 )
 def test_a_run_reaches_an_error_that_is_not_smaller_than_its_own(error, target, reaches):
-    rows = [run_of("tmt", "rk4", error), run_of("tmt", "dopri8", 1e-9, seconds=None)]  # the latter is not timed
+    rows = [
+        run_of("tmt", "rk4", error),
+        run_of("tmt", "dopri8", 1e-9, seconds=None),
+    ]  # the latter is not timed
     assert (conclusions.cheapest(rows, target) is rows[0]) is reaches
     assert conclusions.cheapest(rows, target, engine="mujoco") is None
 
@@ -171,7 +180,10 @@ class Slow:
         self.asked.append((method, setting.steps))
         if method in self.refused:
             raise self.refused[method]
-        states = np.tile(q, (GRID + 1, 1)), np.tile(v + 1.0, (GRID + 1, 1))  # it stays, and has an energy of motion
+        states = (
+            np.tile(q, (GRID + 1, 1)),
+            np.tile(v + 1.0, (GRID + 1, 1)),
+        )  # it stays, and has an energy of motion
         motion = Motion(np.linspace(0.0, 5.0, GRID + 1), *states, seconds=self.seconds[setting.steps])
         return lambda: None, lambda _: motion
 

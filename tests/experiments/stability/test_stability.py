@@ -57,7 +57,9 @@ def test_of_many_keyframes_the_first_are_looked_at():
 def test_a_cart_with_a_pole_leaves_as_predicted_and_its_column_names_both_units(result):
     setup = setup_of_file(CART_POLE)
     robot, known = setup.robot, setup.engines
-    rows = departure.departures(1 / 512, equilibrium(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],))
+    rows = departure.departures(
+        1 / 512, equilibrium(robot, "qpos0"), known, (known["mujoco"].methods["RK4"],)
+    )
     assert "perturbation_m_or_rad" in rows[0].record() and "unit" not in rows[0].record()
     far = [row for row in rows if 1e-7 < row.perturbation < 1e-2]  # less is rounding, more is not linear
     departure.check_departures(result, far)
@@ -75,7 +77,9 @@ def test_predicted_and_observed_limits_agree(engines):
     heavy = equilibrium(dataclasses.replace(ARM, tree=dataclasses.replace(tmt.ARM, mass=(1.9, 1.65))), "bent")
     assert abs(rows[2].row.observed_dt / heavy.limit("rk4")[1] - 1.0) > 2.0 * limits.LIMIT_TOLERANCE
     # growth beyond the limit is slow with little damping: 100-fold in 2000 steps comes 6 % later
-    ((row, kind, _),) = limits.limit_rows(equilibrium(ARM, "bent", 0.5), engines, (METHODS["explicit_euler"],))
+    ((row, kind, _),) = limits.limit_rows(
+        equilibrium(ARM, "bent", 0.5), engines, (METHODS["explicit_euler"],)
+    )
     assert kind == "finite" and row.observed_dt == pytest.approx(row.predicted_dt, rel=5e-4)
 
 
