@@ -28,8 +28,8 @@ settings.register_profile("project", database=None, derandomize=True, deadline=N
 settings.load_profile("project")
 
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
-    "tests": 70, "diagnosis": 22, "engines": 18, "experiments": 58, "export": 8, "fleet": 12, "judge": 2, "process": 8,
-    "report": 12, "stability": 26, "tmt": 52, "truth": 5,
+    "tests": 55, "diagnosis": 32, "engines": 12, "experiments": 56, "export": 10, "fleet": 8, "judge": 2, "process": 20,
+    "report": 12, "stability": 26, "tmt": 44, "truth": 2,
 }  # fmt: skip
 LONGEST = 10  # tests that are listed
 

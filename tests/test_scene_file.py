@@ -98,7 +98,7 @@ def test_a_posture_of_a_case_has_a_quaternion_of_length_1(length, accepted):
     robot = compared_with("model", str(PATHS["pendulum_ball"])).robot
     posture = (*(length * np.array([0.5, 0.5, -0.5, 0.5])).tolist(), 1.0, 0.0, 0.0, 0.0)
     if accepted:
-        assert robot.case(posture=posture).posture == posture
+        assert np.array_equal(robot.case(posture=posture).posture, posture)
         return
     with pytest.raises(ValueError, match="length 1"):
         robot.case(posture=posture)

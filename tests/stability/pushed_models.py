@@ -96,3 +96,18 @@ def linear_limit(text, integrator, within=1e-3):
         middle = (low * high) ** 0.5
         low, high = (low, middle) if grows(middle) else (middle, high)
     return low
+
+
+def walker(iterations, dt=0.005):
+    """A trunk that stands on four servoed legs, with so many iterations of the solver and of its line search."""
+    legs = "".join(
+        f'<body pos="{x} {y} 0"><joint name="leg{k}" axis="0 1 0" damping="0.5" frictionloss="0.1" armature="0.01"/>'
+        '<geom size="0.03" pos="0 0 -0.17" mass="0.2"/></body>'
+        for k, (x, y) in enumerate([(-0.2, -0.1), (-0.2, 0.1), (0.2, -0.1), (0.2, 0.1)])
+    )
+    servos = "".join(f'<position joint="leg{k}" kp="50" kv="1"/>' for k in range(4))
+    return (
+        f'<mujoco><option timestep="{dt}" integrator="implicitfast" iterations="{iterations}" ls_iterations="{iterations}"/>'
+        f'<worldbody>{FLOOR}<body pos="0 0 0.2"><freejoint/><geom type="box" size="0.2 0.1 0.05" mass="3"/>{legs}</body>'
+        f"</worldbody><actuator>{servos}</actuator></mujoco>"
+    )

@@ -9,12 +9,12 @@ from pushed_models import (
     KP,
     LIMIT,
     UPRIGHT,
-    compiled,
     end_speed,
     hinge,
     leg,
     linear_limit,
     sphere,
+    walker,
 )
 
 import compare
@@ -78,25 +78,8 @@ def test_dry_friction_does_not_hide_what_a_push_shows():
 
 
 def test_the_solvers_iterations_are_part_of_the_file():
-    text = (
-        '<mujoco><option timestep="0.002" iterations="1" ls_iterations="1" integrator="implicitfast"/><worldbody>'
-        f'{FLOOR}<body pos="0 0 0.2"><freejoint/><geom type="box" size="0.2 0.1 0.05" mass="3"/>'
-        + "".join(
-            f'<body pos="{x} {y} 0"><joint axis="0 1 0" damping="0.5" frictionloss="0.1" armature="0.01"/>'
-            '<geom size="0.03" pos="0 0 -0.17" mass="0.2"/></body>'
-            for x in (-0.2, 0.2)
-            for y in (-0.1, 0.1)
-        )
-        + "</body></worldbody></mujoco>"
-    )
-    model = compiled(text)
-    model.opt.disableflags = 0
-    few = limits(model, "Euler", "implicitfast")
-    model.opt.iterations = model.opt.ls_iterations = 100
-    assert (
-        few[0].longest_s < limits(model, "Euler", "implicitfast")[0].longest_s
-        or few[1].longest_s <= few[0].longest_s
-    )
+    few, more = (limits(walker(count), "implicitfast")["implicitfast"] for count in (1, 10))
+    assert few.longest_s < 0.005 <= more.longest_s and not few.stable_at_file_dt and more.stable_at_file_dt
 
 
 def test_what_moves_on_by_itself_is_judged_by_divergence_alone():
