@@ -103,7 +103,7 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     mine, arm = (path.read_text(encoding="utf-8") for path in (Path("mine.py"), ARM.mjcf))
     files = dict.fromkeys(FILES_OF_ARM, arm) | {"submissions/b.xml": arm.replace('mass="1.5"', 'mass="1.6"')}
     files |= {"robot.xml": own_equations.XML.replace("</mujoco>", servo), "my_equations.py": mine + POSITIONS}
-    files |= {"points.toml": "mass = 5\n", "recorded.csv": "time,hip\n0,0\n0.5,0.1\n1,0\n"}
+    files |= {"release.txt": "models/a.xml\n", "recorded.csv": "time,hip\n0,0\n0.5,0.1\n1,0\n"}
     for name, text in (files | {"my.toml": blocks("toml")[0]}).items():
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_text(text, encoding="utf-8")

@@ -175,6 +175,10 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
         ax.set_xlabel("torque within one ulp" if claim == 1 else "dt, s")
         ax.set_ylabel("largest movement, rad" if claim == 3 else f"time until a movement of {LEFT:g} rad, s")
         ax.set(xscale="linear" if claim == 1 else "log", yscale="log" if claim == 3 else "linear")
+        if claim == 2:
+            steps = sorted({row.dt for row in rows if row.claim == claim})[::3]
+            ax.set_xticks(steps, [f"{dt:.2g}" for dt in steps])
+            ax.minorticks_off()
         if claim == 3:
             lost = [row.dt for row in rows if row.claim == claim and row.diverged_at is not None]
             ax.plot(lost, [1.0] * len(lost), "x", color="black", label="diverges")

@@ -129,13 +129,15 @@ def over_time(
 
 
 def label_axis(ax: Axes, name: str, unit: str) -> None:
-    """Name a vertical axis."""
+    """Name a vertical axis, with the power of ten by which its numbers are multiplied."""
     low, high = ax.get_ylim()
     largest = max(abs(low), abs(high))
     if high - low < LEVEL * largest:  # a position that does not change: its numbers would all be alike
         ax.set_ylim((low + high) / 2 - 0.05 * largest, (low + high) / 2 + 0.05 * largest)
-    ax.ticklabel_format(axis="y", scilimits=(-2, 4), useOffset=False)
-    ax.set_ylabel(f"{name}, {unit}")
+    power = int(np.floor(np.log10(largest)))
+    factor = 1.0 if -2 <= power <= 3 else 10.0**power
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value / factor:g}".replace("-", "\N{MINUS SIGN}"))
+    ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
 
 
 def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
