@@ -24,7 +24,7 @@ LISTED = Path(__file__).with_name("checks_of_a_small_run.txt")
 MEASURED = re.compile(r"\d+\.\d+(e[-+]?\d+)?|\d+e[-+]?\d+")
 NAMES = [name for name in EXPERIMENTS if not skipped(name, ARM)]
 VARIES = "engines"  # with what is installed
-DEPENDS = "smallest error of", "bent, held, locked:"  # on rounding: where it takes over, which of still joints goes
+DEPENDS = "smallest error of", "bent, held, locked:"  # on rounding: where it rules, which still joint goes
 
 
 def named(result) -> set[str]:

@@ -100,7 +100,7 @@ def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():
     assert stepper.roll(rolled.states, 3).ended.tolist() == [0, 3]
 
 
-@pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 ends the program where memory is so small")
+@pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 ends the program there")
 def test_a_warning_of_another_kind_does_not_end_a_run():
     """Of 300 contacts in too small a memory MuJoCo leaves some out, warns, and goes on; its rollout does not."""
     ball = '<geom size="0.1" pos="0 0 {}" contype="1" conaffinity="2"/>'
