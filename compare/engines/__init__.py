@@ -29,7 +29,7 @@ from ..robots.coordinates import Coordinates
 
 Array = np.ndarray  # of floats
 Tolerance = float | None  # of a method that chooses its steps; None: its own, or fixed steps
-GRID = 64  # number of equal intervals at whose ends a prepared run is read
+GRID = 64  # number of equal intervals at whose ends a run is read, by default
 
 
 @dataclass(frozen=True)
@@ -92,18 +92,24 @@ class Method(NamedTuple):
 
 
 class Setting(NamedTuple):
-    """How a method follows a motion: in a number of steps, or within a tolerance."""
+    """How a method follows a motion: in a number of steps, or within a tolerance; and where the run is read."""
 
     duration: float  # s
     steps: int | None = None
     tolerance: Tolerance = None
+    intervals: int = GRID  # equal ones, at whose ends the run is read
+
+    @property
+    def times(self) -> Array:
+        """s, (intervals + 1,)."""
+        return np.linspace(0.0, self.duration, self.intervals + 1)
 
     @property
     def every(self) -> int:
-        """The number of steps from one time at which the run is read to the next; ValueError if it is not a whole number."""
-        if not self.steps or self.steps % GRID:
-            raise ValueError(f"steps = {self.steps} is not a multiple of {GRID}")
-        return self.steps // GRID
+        """The number of steps of an interval; ValueError if it is not a whole number."""
+        if not self.steps or self.steps % self.intervals:
+            raise ValueError(f"steps = {self.steps} is not a multiple of {self.intervals}")
+        return self.steps // self.intervals
 
 
 class Motion(NamedTuple):
@@ -178,7 +184,7 @@ class Dynamics(Protocol):
         """Motion under constant torque from q, v, recorded at every multiple of dt."""
 
     def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
-        """run() follows one motion once more; read(what it returned) is the motion at the start and at 64 equal times."""
+        """run() follows one motion once more; read(what it returned) is the motion at the times of the setting."""
 
 
 class OneByOne(ABC):
@@ -203,8 +209,7 @@ class OneByOne(ABC):
         return Motion(t, q, v, evaluations, ended[()])
 
     def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
-        t = np.linspace(0.0, setting.duration, GRID + 1)
-        return self.prepared(Course(q, v, tau, t, setting.steps or 0, method, setting.tolerance))
+        return self.prepared(Course(q, v, tau, setting.times, setting.steps or 0, method, setting.tolerance))
 
 
 class Engine(Protocol):

@@ -16,7 +16,7 @@ from tmt.simulation import reasons
 
 from ..robots.case import Case
 from ..robots.states import MOST_SPEEDS
-from . import GRID, Array, Engine, EngineRecord, Method, Motion, Prepared, Setting, Tolerance, rows_of_states
+from . import Array, Engine, EngineRecord, Method, Motion, Prepared, Setting, Tolerance, rows_of_states
 
 ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", in_quick_runs=True)
 # schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
@@ -94,22 +94,21 @@ class TmtDynamics(TmtQuantities):
         if setting.tolerance is not None and not stepping.adaptive:
             raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
         if stepping.adaptive and not setting.steps:
-            setting = setting._replace(steps=GRID)  # between which it takes its own
-        every, steps = setting.every, setting.every * GRID
+            setting = setting._replace(steps=setting.intervals)  # between which it takes its own
+        every, steps = setting.every, setting.every * setting.intervals
         dt = setting.duration / steps
         positions, speeds = paths = [np.full((1, steps + 1, len(start)), np.nan) for start in (q, v)]
         positions[0, 0], speeds[0, 0] = q, v
         runner, info = runner_of(self.tree, method), np.zeros((1, 3), np.int64)
         arrays = positions, speeds, np.array(tau, float)[None], info
         call = runner.call(1, arrays, dt, tolerance)
-        t = np.linspace(0.0, setting.duration, GRID + 1)
 
         def read(_: Any) -> Motion:
             codes, evaluations = runner.outcome(positions, speeds, info)
             (ended,) = reasons(self.tree, positions, speeds, codes, dt, tolerance)
             taken = evaluations // stepping.stages if stepping.adaptive else steps
             q, v = (path[0, ::every].copy() for path in paths)
-            return Motion(t, q, v, evaluations, ended, taken)
+            return Motion(setting.times, q, v, evaluations, ended, taken)
 
         return lambda _=arrays: call(), read  # the arrays live as long as it
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...robots.case import Case
-from .. import GRID, Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
+from .. import Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
 from .actuators import engage
 from .inventory import contact_pairs
 from .names import (
@@ -216,7 +216,7 @@ class MujocoDynamics:
 
     def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
         steps, every = int(setting.steps or 0), setting.every
-        dt, t = setting.duration / steps, np.linspace(0.0, setting.duration, GRID + 1)
+        dt = setting.duration / steps
         stepper = self.stepper(dt, method, setting.tolerance)
         state = self.states(stepper, q, v, tau)[1][0]
 
@@ -225,7 +225,7 @@ class MujocoDynamics:
             path[1 + stepper.taken(physics) :] = np.nan
             qpos, qvel = (path[None, :, stepper.places[name]] for name in ("qpos", "qvel"))
             motion = self.motion(qpos, qvel, dt, (), EVALUATIONS[method])
-            return motion._replace(t=t, q=motion.q[::every], v=motion.v[::every])
+            return motion._replace(t=setting.times, q=motion.q[::every], v=motion.v[::every])
 
         return stepper.loop(state, steps), read
 

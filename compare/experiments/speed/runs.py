@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from ...core.rows import MOVEMENT, MovementRow, column
 from ...engines import GRID, IN_QUICK_RUNS, RECORDS, Dynamics, Engine, Method, Setting
 from ...engines.outside.file import EngineError, TooLong
 from ...judge.rounding import growth
-from ...judge.run import diverged_at, movement_unit
+from ...judge.run import movement_unit
 from ...judge.scale import EPS
 from ...robots.case import Case
 from ...truth.reference import Reference, coarsest_steps, reference
+from ..runs import follow
 from .settings import budget, methods, settings_of
 
 NEAR = 1.0  # rad or m: a run whose largest error is smaller has not diverged
@@ -120,19 +122,35 @@ def measure(
     silent: dict[str, str] = {}  # engines, and why
     paths: list[np.ndarray] = []  # of the rows that reach the end
     for method, of_method in settings.items():
+        row_of = partial(
+            RunRow, scene=case.name, engine=method.engine, method=method.name, scheme=method.scheme, order=method.order,
+            unit=movement_unit(case.coordinates),
+        )  # fmt: skip
         for setting in of_method:
             try:
                 begin = time.process_time()
                 if method.engine in silent:
                     raise EngineError(silent[method.engine])
-                row, path = measured(case, engines[method.engine], method, setting, reference)
-                rows.append(row)
-                paths += [] if row.ended else [path]
+                run = follow(case, engines[method.engine].of(case), setting, method.name)
             except EngineError as error:
                 if isinstance(error, TooLong):
                     silent[method.engine] = str(error)
-                rows.append(row_of(case, method, why_not=str(error).rstrip(".")))
+                rows.append(row_of(why_not=str(error).rstrip(".")))
                 break
+            row = row_of(
+                tolerance=setting.tolerance, dt=setting.duration / setting.steps if setting.steps else None,
+                steps=run.steps, evaluations=run.evaluations, seconds=run.seconds, compile_seconds=run.preparation,
+            )  # fmt: skip
+            rows.append(row)
+            with np.errstate(all="ignore"):
+                errors = np.maximum(reference.error(run.q), reference.apart if reference.why else 0.0)
+            # a run that stays near has about the energy of the reference
+            if not errors.max() <= NEAR and run.ended < math.inf:
+                row.ended = run.why or f"diverged at {run.ended:.2g} s"
+            else:
+                paths.append(np.hstack([run.q, run.v]))
+                row.error, row.worst_error = float(errors[-1]), float(errors.max())
+                row.early_error = float(errors[reference.t <= EARLY].max())
             # of this process, which another one may interrupt, its own time
             spent = row.time if RECORDS[method.engine].reads_file else time.process_time() - begin
             if spent > budget:
@@ -144,42 +162,6 @@ def measure(
     return rows
 
 
-def row_of(case: Case, method: Method, **values: object) -> RunRow:
-    """A row of a method in a case."""
-    about = {"scene": case.name, "engine": method.engine, "method": method.name, "scheme": method.scheme}
-    unit = movement_unit(case.coordinates)
-    return RunRow(**about, order=method.order, unit=unit, **values)  # type: ignore[arg-type]
-
-
-def measured(
-    case: Case, engine: Engine, method: Method, setting: Setting, reference: Reference
-) -> tuple[RunRow, np.ndarray]:
-    """The row of one run, with its time and the errors of positions at 65 equal times; and its states there."""
-    dynamics = engine.of(case)
-    with np.errstate(all="ignore"):  # in a run that diverges
-        begin = time.perf_counter()
-        run, read = dynamics.prepare(*case.start, case.tau, setting, method.name)
-        prepared = time.perf_counter() - begin
-        begin = time.perf_counter()
-        outcome = run()
-        seconds = time.perf_counter() - begin
-        motion = read(outcome)
-        errors = np.maximum(reference.error(motion.q), reference.apart if reference.why else 0.0)
-        is_near = errors.max() <= NEAR  # then it has the energy of the reference, about
-        at = None if is_near else diverged_at(case, reference.t, motion.q, motion.v)
-    row = row_of(case, method, tolerance=setting.tolerance, evaluations=motion.evaluations)
-    row.dt = setting.duration / setting.steps if setting.steps else None
-    row.steps = setting.steps or motion.steps
-    row.seconds = seconds if motion.seconds is None else motion.seconds
-    row.compile_seconds = getattr(dynamics, "seconds_prepared", None) or prepared
-    if at is not None:
-        row.ended = str(motion.ended or f"diverged at {at:.2g} s")
-        return row, motion.states
-    row.error, row.worst_error = float(errors[-1]), float(errors.max())
-    row.early_error = float(errors[reference.t <= EARLY].max())
-    return row, motion.states
-
-
 def floor(case: Case, dynamics: Dynamics) -> float:
     """The error of the angles that rounding leaves, rad: eps times the largest growth of a small difference.
 
@@ -189,11 +171,11 @@ def floor(case: Case, dynamics: Dynamics) -> float:
     first = recorded * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // recorded))
     for steps in (first, 4 * first, 16 * first):
         dt = case.duration / steps
-        motion = dynamics.run(*case.start, case.tau, dt, steps, "rk4")
-        if np.isfinite(motion.q).all():
+        run = follow(case, dynamics, Setting(case.duration, steps, intervals=steps), "rk4")
+        if np.isfinite(run.q).all():
             stride = 1 if case.coordinates.nv <= EACH_STEP else GROWTH_STEPS
-            grown = growth(METHODS["rk4"], case.tree, motion.q, motion.v, case.tau, dt, GROWTH_STEPS, stride)
-            return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(motion.q).max()))
+            grown = growth(METHODS["rk4"], case.tree, run.q, run.v, case.tau, dt, GROWTH_STEPS, stride)
+            return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(run.q).max()))
     reached = f"scene {case.name!r}: RK4 with {steps} steps does not reach its end"
     raise ValueError(f"{reached}; expected a shorter scene")
 

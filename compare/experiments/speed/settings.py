@@ -11,7 +11,7 @@ from ...robots.case import Case
 from ...truth.reference import coarsest_steps
 
 # steps; more would take too long
-FINEST, FINEST_OTHERS = {"mujoco": 2**15, ("mujoco", "RK4"): 2**16, "tmt": 2**18}, 2**15
+FINEST, FINEST_OTHERS = {"tmt": 2**18}, 2**15
 EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
     "dopri8_adaptive": (2, 14), "RK45": (2, 10), "DOP853": (2, 13), "Radau": (2, 4), "LSODA": (2, 12),
     "Taylor": (4, 16), "RK3 adaptive": (2, 9), "Radau3 adaptive": (2, 7),
@@ -21,7 +21,7 @@ FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
 # seconds of the finest run of a method; of a method whose coarsest run takes longer there is none; and after which
 # a method of a called engine has no finer run
-MOST_SECONDS, SLOWEST_RUN, LONGEST_CALLED = {"full": 0.3, "quick": 0.1, "small": 0.1}, 0.6, 0.08
+MOST_SECONDS, SLOWEST_RUN, LONGEST_CALLED = {"full": 0.3, "quick": 0.1, "small": 0.1}, 0.6, 0.06
 # A robot may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5; an engine
 # that is called from Python adds those of a call and of the solver's own work:
 SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
@@ -41,7 +41,7 @@ class Budget(NamedTuple):
 def budget(method: Method, robot: Robot, size: str) -> Budget:
     """The budget of a method for a robot in a run of this size, from estimated times of its steps."""
     case, n, most = regular_of(robot), robot.coordinates.nv, MOST_SECONDS[size]
-    finest = FINEST.get((method.engine, method.name), FINEST.get(method.engine, FINEST_OTHERS))
+    finest = FINEST.get(method.engine, FINEST_OTHERS)
     settings = FEW_SETTINGS.get(size, finest)
     if size != "full" and method.engine not in IN_QUICK_RUNS:
         settings = FEW_OTHERS

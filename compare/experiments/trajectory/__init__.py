@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...core.check import Result, largest_known
 from ...core.finding import Finding
@@ -15,7 +15,8 @@ from ...robots.case import Case
 from ...truth.reference import RECORDS, Reference, reference
 from .. import Experiment
 from ..setup import Setup, different_first
-from .runs import SCHEMES_OF_RK4, TrajectoryResult, follow, recorded
+from .pairs import SCHEMES_OF_RK4, TrajectoryResult, recorded
+from .runs import compare_case
 
 EXPERIMENT = Experiment(order=70, options=("--joints", "--scenes"), diagnosed=True, overview="scenes")
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
@@ -26,13 +27,9 @@ SHOWN = ["scene", "engine_integrator", "dt_s", "level", "largest_difference", "u
 skipped = leaves_no_digits
 
 
-class Work(NamedTuple):
-    """What begin starts."""
-
-    runs: Iterable[TrajectoryResult]  # of each scene
-    names: Sequence[str]  # of the scenes whose true motion is computed
-    true: Iterable[Reference]
-    left_out: Mapping[str, float | None]  # scenes: seconds that they would take; None: there is no method
+# what begin starts: of each scene the comparison; the scenes whose true motion is computed, with it; and the scenes
+# that are left out, with the seconds that they would take, None: there is no method
+Work = tuple[Iterable[TrajectoryResult], Iterable[tuple[str, Reference]], Mapping[str, float | None]]
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:
@@ -50,8 +47,8 @@ def begin(setup: Setup) -> Work:
     # a file's robot has scenes with steps of their own
     fast = [] if robot.is_read else [case for case in cases if "speed" in case.scene.tags]
     true = [case for case in fast if case.steps == RECORDS]
-    runs = spread(partial(follow, engines=engines, finer=finer), different_first(cases))
-    return Work(runs, [case.name for case in true], spread(reference, true), left_out)
+    runs = spread(partial(compare_case, engines=engines, finer=finer), different_first(cases))
+    return runs, zip([case.name for case in true], spread(reference, true)), left_out
 
 
 def cases_left_out(setup: Setup, cases: Sequence[Case]) -> dict[str, float | None]:
@@ -63,30 +60,28 @@ def cases_left_out(setup: Setup, cases: Sequence[Case]) -> dict[str, float | Non
     parts = ("acceleration",) if equations.has("acceleration") else ("mass_matrix", "bias")
     of_evaluation = OVERHEAD_OF_OWN + sum(equations.times[part] for part in parts)
     for case in cases:
-        if not setup.own.methods_in(case) or not case.scene.gravity:
-            left_out[case.name] = None
-            continue
-        seconds = of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case))
-        left -= seconds
-        if left < 0.0:
+        is_able = setup.own.methods_in(case) and case.scene.gravity
+        seconds = of_evaluation * STAGES_OF_RK4 * (case.steps + recorded(case)) if is_able else None
+        left -= seconds or 0.0
+        if seconds is None or left < 0.0:
             left_out[case.name] = seconds
     return left_out
 
 
 def rows(setup: Setup, work: Work | None = None) -> TrajectoryResult:
     """Single steps and open loops of each scene, integrator and step; departures and errors."""
-    robot, work = setup.robot, begin(setup) if work is None else work
+    robot, (parts, true, left_out) = setup.robot, begin(setup) if work is None else work
     result = TrajectoryResult("trajectory", label=LABELS[robot.compared[0]], shown=SHOWN)
-    for part in work.runs:
+    for part in parts:
         result.rows += part.rows
         result.checks += part.checks
-        result.runs += part.runs
-    find_errors(result, robot, dict(zip(work.names, work.true)))
+        result.pairs += part.pairs
+    find_errors(result, robot, dict(true))
     find_schemes(result, robot, setup.engines["mujoco"])
     if rows := [row for row in result.of_beginnings if row.level == "open loop"]:
         result.find("beginnings", rows=rows)
-    if work.left_out:
-        result.find("left_out", scenes=work.left_out)
+    if left_out:
+        result.find("left_out", scenes=left_out)
     return result
 
 
@@ -98,32 +93,27 @@ def find_errors(result: TrajectoryResult, robot: Robot, references: Mapping[str,
     scenes, unit = [], movement_unit(robot.coordinates)
     claims = robot.claims.of_scenes if robot.claims else {}
     for case in sorted(robot.cases, key=lambda case: not case.is_held):
-        run, reference = result.run_of(case, *SCHEMES_OF_RK4), references.get(case.name)
-        if not run or not (case.is_held or reference):
+        pair, reference = result.pair_of(case, *SCHEMES_OF_RK4), references.get(case.name)
+        if not pair or not (case.is_held or reference):
             continue
-        largest: dict[str, float | None] = {}
-        for engine, path in run.paths.items():
-            error = deviation(path.q, path.q[0], case.coordinates)
+        engines, largest = list[dict[str, Any]](), list[float | None]()
+        for engine, run in pair.runs.items():
+            error = deviation(run.q, run.q[0], case.coordinates)
             if reference and not case.is_held:
-                error = reference.error(path.q).max()
-            largest[engine] = number_or_none(error)
-        first, second = largest.values()
-        result.errors[case.name] = first, second
-        apart = run.apart
-        scenes.append(
-            {"scene": case.name, "first": first, "second": second, "difference": apart, "unit": unit}
-        )
+                error = reference.error(run.q).max()
+            largest.append(number_or_none(error))
+            engines.append({"label": LABELS[engine], "left": run.left, "farthest": largest[-1]})
+        result.errors[case.name] = tuple(largest)
+        scenes.append({"scene": case.name, "engines": engines, "difference": pair.apart.max(), "unit": unit})
         if case.is_held:
-            engines = [{"label": LABELS[engine], "left": path.left, "farthest": largest[engine]}
-                       for engine, path in run.paths.items()]  # fmt: skip
             result.find("held", scene=robot.scene_begins(case.name), engines=engines, claim=claims.get(case.name),
                         limit=LEFT, duration=case.duration, unit=unit, stated=robot.compared[0] == "tmt")  # fmt: skip
     if result.errors:
-        counts = {min(run.steps for run in result.runs if run.case.name == name) for name in result.errors}
+        counts = {case.steps for case in robot.cases if case.name in result.errors}
         steps = counts.pop() if len(counts) == 1 else None
         result.answer = result.finding("answer", errors=result.errors, steps=steps, unit=unit)
     if any(name in references for name in result.errors):  # held scenes have their own findings
-        result.find("errors", labels=[LABELS[engine] for engine in robot.compared], scenes=scenes)
+        result.find("errors", scenes=scenes)
 
 
 def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None:
@@ -140,7 +130,7 @@ def find_schemes(result: TrajectoryResult, robot: Robot, mujoco: Engine) -> None
 
 
 def cases_run(result: TrajectoryResult, robot: Robot) -> list[Case]:
-    names = {run.case.name for run in result.runs}
+    names = {pair.case.name for pair in result.pairs}
     return [case for case in robot.cases if case.name in names]
 
 
@@ -160,12 +150,12 @@ def figures(result: TrajectoryResult, robot: Robot) -> Iterator[partial[Any]]:
     cases = cases_run(result, robot)
     numbers = robot.claims.figures if robot.claims else {}
     for case in cases:
-        run = result.run_of(case, "rk4") if case.is_held else None
-        if run and case.name in numbers:
-            yield partial(figures_runs.draw_held, result, run, numbers[case.name])
+        pair = result.pair_of(case, "rk4") if case.is_held else None
+        if pair and case.name in numbers:
+            yield partial(figures_runs.draw_held, result, pair, numbers[case.name])
     for case in cases:
         yield partial(figures_runs.draw_run, result, case)
-    if drawn := figures_motion_gif.drawn_runs(robot, result.runs):
+    if drawn := figures_motion_gif.drawn_pairs(robot, result.pairs):
         yield partial(figures_motion_gif.draw_motion, drawn, result.label)
 
 

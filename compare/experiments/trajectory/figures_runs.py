@@ -18,7 +18,7 @@ from ...report.style import BLUE, GREY, LINES, ORANGE, RED, WIDTH, file_name, ze
 from ...robots import Robot
 from ...robots.case import Case
 from ..figures import MOST_ROWS, beyond_tolerance, chart, lines_to, named_rows
-from .runs import Run, TrajectoryResult
+from .pairs import Pair, TrajectoryResult
 
 DRAWN_ZERO = 1e-18  # rad: where differences of exactly zero are drawn
 LEVEL = 1e-6  # of a position: a smaller change is not seen in a panel
@@ -30,44 +30,47 @@ MOST_LINES = len(LINES)  # of joints in a panel
 LEAST_SHARE, MOST_SHARE = 1e-4, 1e3  # of a band
 
 
-def draw_held(result: TrajectoryResult, run: Run, number: int) -> tuple[str, Figure, Finding]:
+def draw_held(result: TrajectoryResult, pair: Pair, number: int) -> tuple[str, Figure, Finding]:
     """The assignment's figure of a held posture: angles against time, and when each engine leaves it."""
-    name, end = run.case.name, float(run.t[-1])
+    name, end = pair.case.name, pair.case.duration
     fig = Figure(figsize=(WIDTH, 3.3), layout="constrained")
     ax = fig.subplots()
-    over_time(ax, run, [np.degrees(run.until_diverged(engine, path.q)) for engine, path in run.paths.items()])
+    over_time(ax, pair, [np.degrees(q) for q in pair.until_diverged("q")])
     engines = []
-    for (engine, path), error, dash in zip(run.paths.items(), result.errors[name], ("--", ":")):
-        engines.append({"label": LABELS[engine], "left": path.left, "error": error})
-        if path.left is not None:
-            label = f"{LABELS[engine]} leaves at {path.left:.2f} s"
-            ax.axvline(path.left, color="black", linestyle=dash, label=label)
+    for (engine, run), error, dash in zip(pair.runs.items(), result.errors[name], ("--", ":")):
+        engines.append({"label": LABELS[engine], "left": run.left, "error": error})
+        if run.left is not None:
+            label = f"{LABELS[engine]} leaves at {run.left:.2f} s"
+            ax.axvline(run.left, color="black", linestyle=dash, label=label)
     ax.set(xlabel="time, s", ylabel="hinge angle, deg", xlim=(0, end))
     fig.legend(loc="outside upper center", ncols=LEGEND_COLUMNS + 1)
     caption = result.finding(
-        "figure_held", number=number, scene=name, end=end, steps=run.steps, limit=LEFT, engines=engines,
-        judged=run.judged_until, apart=run.apart, unit=movement_unit(run.case.coordinates),
+        "figure_held", number=number, scene=name, end=end, steps=pair.steps, limit=LEFT, engines=engines,
+        judged=pair.judged_until, apart=pair.apart.max(), unit=movement_unit(pair.case.coordinates),
     )  # fmt: skip
     return f"assignment_figure_{number}", fig, caption
 
 
 def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding]:
     """One scene under each scheme: movements, speeds, and the difference under its band; grey: not judged."""
-    runs = [run for run in result.runs if run.case.name == case.name]
-    steps = max(run.steps for run in runs if run.steps <= 16 * case.steps)
-    runs = [run for run in runs if run.steps == steps]
-    shown, unit = differing_most(case, runs), movement_unit(case.coordinates)
-    step = step_in_words(case, steps)
+    pairs = [pair for pair in result.pairs if pair.case.name == case.name]
+    steps = max(pair.steps for pair in pairs if pair.steps <= 16 * case.steps)
+    pairs = [pair for pair in pairs if pair.steps == steps]
+    most_apart = np.argsort(-np.fmax.reduce([pair.apart for pair in pairs]), kind="stable")[:MOST_LINES]
+    shown, unit, step = (
+        sorted(most_apart.tolist()),
+        movement_unit(case.coordinates),
+        step_in_words(case, steps),
+    )
     fig = Figure(figsize=(WIDTH, 6.2))  # laid out by hand: nine axes take a second otherwise
-    axes = fig.subplots(3, len(runs), sharex=True, sharey="row", squeeze=False)
-    for (positions, speeds, below), run in zip(axes.T, runs):
-        moved = {engine: case.coordinates.difference(path.q, path.q[0]) for engine, path in run.paths.items()}
-        speed = {engine: path.v for engine, path in run.paths.items()}
-        for ax, of_engines in ((positions, moved), (speeds, speed)):
-            alive = [run.until_diverged(*of_engine) for of_engine in of_engines.items()]
-            over_time(ax, run, alive, shown, 64 // len(runs))
-        positions.set_title(f"{run.integrator}, {step}" if len(runs) < 4 else f"{run.integrator}\n{step}")
-        draw_difference(below, run, result.label)
+    axes = fig.subplots(3, len(pairs), sharex=True, sharey="row", squeeze=False)
+    for (positions, speeds, below), pair in zip(axes.T, pairs):
+        moved = [case.coordinates.difference(q, q[0]) for q in pair.until_diverged("q")]
+        for ax, of_engines in ((positions, moved), (speeds, [*pair.until_diverged("v")])):
+            over_time(ax, pair, of_engines, shown, 64 // len(pairs))
+        title = f"{pair.integrator}, {step}" if len(pairs) < 4 else f"{pair.integrator}\n{step}"
+        positions.set_title(title)
+        draw_difference(below, pair, result.label)
     values = np.concatenate([line.get_ydata() for ax in axes[2] for line in ax.lines])
     values = values[np.isfinite(values)]
     if (values <= DRAWN_ZERO).any():
@@ -81,21 +84,21 @@ def draw_run(result: TrajectoryResult, case: Case) -> tuple[str, Figure, Finding
     share = largest_known([row.difference_over_band for row in rows])
     caption = result.finding(
         "figure_run", scene=case.robot.scene_begins(case.name), shown=len(shown), positions=case.coordinates.nv,
-        share=share, judged=[(run.integrator, run.judged_until) for run in runs],
+        share=share, judged=[(pair.integrator, pair.judged_until) for pair in pairs],
     )  # fmt: skip
     return file_name("trajectory", case.name), fig, caption
 
 
-def draw_difference(ax: Axes, run: Run, label: str) -> None:
-    """The engines' difference in a run, and its band."""
-    first, mujoco = (run.until_diverged(engine, path.q) for engine, path in run.paths.items())
-    difference = moved_from(first, mujoco, run.case.coordinates).max(axis=1)
-    band, end = np.where(run.band < 1e3, run.band, np.nan), run.case.duration
+def draw_difference(ax: Axes, pair: Pair, label: str) -> None:
+    """The engines' difference, and its band."""
+    first, mujoco = pair.until_diverged("q")
+    difference = moved_from(first, mujoco, pair.case.coordinates).max(axis=1)
+    band, end = np.where(pair.band < 1e3, pair.band, np.nan), pair.case.duration
     shown = np.maximum(difference[1:], DRAWN_ZERO)
-    ax.semilogy(run.t[1:], shown, color="black", linewidth=1, label=f"{label} to MuJoCo")
-    ax.semilogy(run.t[:: run.every][1:], band[1:], "--", color=ORANGE, label="band of rounding")
-    if run.judged_until < end:
-        ax.axvspan(run.judged_until, end, **NOT_JUDGED)
+    ax.semilogy(pair.t[1:], shown, color="black", linewidth=1, label=f"{label} to MuJoCo")
+    ax.semilogy(pair.t[:: pair.every][1:], band[1:], "--", color=ORANGE, label="band of rounding")
+    if pair.judged_until < end:
+        ax.axvspan(pair.judged_until, end, **NOT_JUDGED)
     ax.set(xlabel="time, s", xlim=(0, end))
     # its last number would overlap the next column's first
     ax.xaxis.set_major_locator(MaxNLocator(3, prune="upper"))
@@ -113,18 +116,18 @@ def add_legend(fig: Figure, axes: np.ndarray, long: bool) -> None:
 
 
 def over_time(
-    ax: Axes, run: Run, values: Sequence[np.ndarray], shown: Sequence[int] = (), marks_at_most: int = 64
+    ax: Axes, pair: Pair, values: Sequence[np.ndarray], shown: Sequence[int] = (), marks_at_most: int = 64
 ) -> None:
     """Positions or speeds of both engines, (times, nv): lines, and marks for MuJoCo. shown: which; (): all."""
-    every = slice(None, None, max(1, len(run.t) // marks_at_most))
-    robot, names, (first, mujoco) = run.case.robot, run.case.coordinates.speeds, values
+    every = slice(None, None, max(1, len(pair.t) // marks_at_most))
+    robot, names, (first, mujoco) = pair.case.robot, pair.case.coordinates.speeds, values
     all_names = robot.coordinates.speeds
     few = len(all_names) <= MOST_LINES  # then a joint looks the same in every figure
     for k, i in enumerate(shown or range(len(names))):
         colour, dash = LINES[all_names.index(names[i]) if few else k]
         label = f"{robot.symbol(names[i])}, {LABELS[robot.compared[0]]}"
-        ax.plot(run.t, first[:, i], linestyle=dash, color=colour, label=label)
-        ax.plot(run.t[every], mujoco[every, i], color=colour, clip_on=False, **MARKS)
+        ax.plot(pair.t, first[:, i], linestyle=dash, color=colour, label=label)
+        ax.plot(pair.t[every], mujoco[every, i], color=colour, clip_on=False, **MARKS)
     ax.plot([], [], color="black", label="MuJoCo", **MARKS)
 
 
@@ -138,18 +141,6 @@ def label_axis(ax: Axes, name: str, unit: str) -> None:
     factor = 1.0 if -2 <= power <= 3 else 10.0**power
     ax.yaxis.set_major_formatter(lambda value, _: f"{value / factor:g}".replace("-", "\N{MINUS SIGN}"))
     ax.set_ylabel(f"{name}, {unit}" if factor == 1.0 else f"{name}, {factor:.0e} {unit}")
-
-
-def differing_most(case: Case, runs: Sequence[Run]) -> list[int]:
-    """The movements that are drawn: all, or those in which the engines differ most while judged."""
-    count = case.coordinates.nv
-    if count <= MOST_LINES:
-        return list(range(count))
-    largest = np.zeros(count)
-    for run in runs:
-        first, mujoco = (path.q[run.t <= run.judged_until] for path in run.paths.values())
-        largest = np.fmax(largest, moved_from(first, mujoco, case.coordinates).max(axis=0))
-    return sorted(np.argsort(-largest, kind="stable")[:MOST_LINES].tolist())
 
 
 def draw_scenes(result: TrajectoryResult, robot: Robot) -> tuple[str, Figure, Finding]:

@@ -126,7 +126,7 @@ def test_engines_that_read_the_file_take_part_in_the_regular_scene_of_a_full_run
 
 
 @pytest.mark.parametrize("engine, method, size, expected", [
-    ("mujoco", "RK4", "full", (2**16, 2**16)), ("mujoco", "Euler", "full", (2**15, 2**15)),
+    ("mujoco", "RK4", "full", (2**15, 2**15)), ("mujoco", "Euler", "full", (2**15, 2**15)),
     ("tmt", "rk4", "full", (2**17, 2**18)), ("tmt", "rk4", "small", (7, 2**18)), ("scipy", "RK45", "quick", (2, None)),
 ])  # fmt: skip
 def test_a_budget_is_that_of_the_finest_run(engines, engine, method, size, expected):

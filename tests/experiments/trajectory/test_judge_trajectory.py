@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from edited import setup_of_file
-from trajectory_curves import FREE, HELD, run_of
+from trajectory_curves import FREE, HELD, NEVER, pair_of, run_of
 
 import tmt
 from compare.experiments.trajectory import find_errors, headline, runs
-from compare.experiments.trajectory.runs import Path, TrajectoryResult
+from compare.experiments.trajectory.pairs import TrajectoryResult
 from compare.judge.run import widest_judged
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
@@ -22,13 +22,18 @@ NARROW, AT_ONCE = np.full(11, 0.999e-3), np.array([0.0, 1e-9, *[np.inf] * 9])
 
 
 def test_a_run_is_judged_while_its_band_is_narrow_and_nothing_has_diverged():
-    times, never = np.arange(5.0), (None, None)
-    narrow = np.ones((5, 2), bool)
-    wide = narrow & np.array([[True], [True], [False], [True], [True]])
-    assert runs.judged(times, narrow, never) == 5
-    assert runs.judged(times, wide, never) == runs.judged(times, narrow & wide[:, :1], never) == 2
-    assert runs.judged(times, narrow, (2.5, 4.0)) == 3
-    assert runs.judged(times, ~narrow, never) == 1
+    case = FREE.changed(duration=4.0, dt=1.0)
+    narrow = np.full((5, 6), 0.9e-3)
+    wide = narrow + 0.2e-3 * np.array([[False], [True], [False], [True], [True]])
+
+    def judged(width, ended=NEVER):
+        return replace(pair_of(case, ended=ended, steps=4), width=width).judged
+
+    assert judged(narrow) == 5
+    assert judged(wide) == judged(np.hstack([wide[:, :1], narrow[:, 1:]])) == 1
+    assert judged(np.where(np.arange(5)[:, None] < 2, narrow, 1.0)) == 2
+    assert judged(narrow, (2.5, 4.0)) == 3
+    assert judged(narrow + 1.0) == 1
 
 
 def test_a_band_judges_nothing_that_moves_less():
@@ -57,8 +62,9 @@ def test_a_band_judges_nothing_that_moves_less():
     (0.0, 0.0, 0.0, True),
 ])  # fmt: skip
 def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, judged):
-    result, run = TrajectoryResult("trajectory"), run_of(FREE.changed(judged=required), until=until)
-    runs.check_time_judged(result, run, alive)
+    pair = SimpleNamespace(case=FREE, where="", required=required, judged_until=until)
+    result = TrajectoryResult("trajectory")
+    runs.check_time_judged(result, pair, alive)
     assert [check.passed for check in result.checks] == [judged] * (required > 0.0 or not judged)
     assert all(check.judged == judged for check in result.checks)
 
@@ -66,8 +72,11 @@ def test_a_run_that_is_judged_too_short_is_not_judged(required, until, alive, ju
 def level(difference, bar):
     """The check and the row of differences (states, 2 nv)."""
     result, times = TrajectoryResult("trajectory"), np.arange(len(difference)) / 2
-    run, tolerance = replace(run_of(FREE), case=lift_and_head()), np.full(np.shape(difference), bar)
-    runs.check_level(result, run, "open loop", times, np.array(difference), tolerance)
+    case = lift_and_head()
+    still = run_of(case, np.tile(case.q, (65, 1)), np.zeros((65, 4)))
+    pair = replace(pair_of(FREE), runs={"tmt": still, "mujoco": still})
+    tolerance = np.full(np.shape(difference), bar)
+    runs.check_level(result, pair, "open loop", times, np.array(difference), tolerance)
     return result.checks[0], result.rows[0]
 
 
@@ -98,8 +107,8 @@ def test_a_row_has_the_largest_movement_beside_the_worst_component():
 
 
 @pytest.mark.parametrize("ours, theirs, width, found", [
-    (None, None, NARROW, []), (0.5, 0.5, NARROW, [True]), (0.5, 0.51, NARROW, [False]),
-    (None, 0.5, NARROW, [False]), (0.5, None, NARROW + 2e-6, []), (0.1, 0.11, AT_ONCE, [False]),
+    (*NEVER, NARROW, []), (0.5, 0.5, NARROW, [True]), (0.5, 0.51, NARROW, [False]),
+    (np.inf, 0.5, NARROW, [False]), (0.5, np.inf, NARROW + 2e-6, []), (0.1, 0.11, AT_ONCE, [False]),
     (0.12, 0.13, AT_ONCE, []),  # the band opens before the next recorded state
 ])  # fmt: skip
 def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, width, found):
@@ -107,16 +116,16 @@ def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, wi
     case = FREE.changed(duration=1.0, dt=0.1)
     result = TrajectoryResult("trajectory")
     width = np.outer(width, [1.0, 1.0, 1.0, 1e9, 1e9, 1e9])  # that of speeds does not count
-    runs.check_divergence(result, replace(run_of(case, ended=(ours, theirs), steps=100), width=width))
+    runs.check_divergence(result, replace(pair_of(case, ended=(ours, theirs), steps=100), width=width))
     assert [check.passed for check in result.checks] == found
 
 
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
     q = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
-    others = [run_of(HELD, 9.0, 9.0, scheme="implicit"), run_of(HELD, 9.0, 9.0, steps=128)]
-    free, held = run_of(FREE), run_of(HELD, 0.25, np.nan)
-    free = replace(free, paths={"tmt": Path(q, q), "mujoco": Path(q + 100.0, q)})
-    result = TrajectoryResult("trajectory", runs=[*others, free, held])
+    others = [pair_of(HELD, 9.0, 9.0, scheme="implicit"), pair_of(HELD, 9.0, 9.0, steps=128)]
+    free, held = pair_of(FREE), pair_of(HELD, 0.25, np.nan)
+    free = replace(free, runs={"tmt": run_of(FREE, q, q), "mujoco": run_of(FREE, q + 100.0, q)})
+    result = TrajectoryResult("trajectory", pairs=[*others, free, held])
     find_errors(result, ARM, {FREE.name: reference(FREE)})
     assert list(result.errors) == [HELD.name, FREE.name] and result.errors[HELD.name] == (0.25, None)
     assert result.answer.values["steps"] == 64
@@ -127,17 +136,17 @@ def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_
 
 
 @pytest.mark.parametrize("ours, theirs, at_once, found", [
-    (2.5, 2.5, False, [True]), (2.5, 2.6, False, [False]), (None, None, False, []),
+    (2.5, 2.5, False, [True]), (2.5, 2.6, False, [False]), (*NEVER, False, []),
     (5 / 64, 5 / 64, False, [True]), (5 / 64, 5 / 64, True, [None]),  # the band is wide: nothing is known
 ])  # fmt: skip
 def test_of_two_runs_that_diverge_the_step_is_compared_or_nothing_is_judged(ours, theirs, at_once, found):
     """In a user's scene, which states no time and no movement."""
     case = FREE.changed(judged=0.0, tags=("own",))
-    run = run_of(case, ended=(ours, theirs), until=0.0 if at_once else 5.0)
+    pair = pair_of(case, ended=(ours, theirs))
     if at_once:
-        run = replace(run, width=np.full((65, 6), np.inf))
+        pair = replace(pair, width=np.full((65, 6), np.inf))
     result = TrajectoryResult("trajectory")
-    runs.check_end(result, run)
+    runs.check_end(result, pair)
     ended = [check for check in result.checks if check.quantity != "time judged"]
     assert [check.passed if check.judged else None for check in ended] == found
 
@@ -146,8 +155,8 @@ def test_a_headline_has_the_share_of_the_band_only_where_nothing_fails():
     for off, said in ((0.9, True), (1.1, False), (np.nan, False)):
         result, apart, bars = TrajectoryResult("trajectory"), np.zeros((2, 6)), np.ones((2, 6))
         apart[1, 2] = off
-        runs.check_level(result, run_of(FREE), "open loop", np.arange(2.0), apart, bars)
-        runs.check_level(result, run_of(HELD), "open loop", np.arange(2.0), 0.0 * bars, bars)
+        runs.check_level(result, pair_of(FREE), "open loop", np.arange(2.0), apart, bars)
+        runs.check_level(result, pair_of(HELD), "open loop", np.arange(2.0), 0.0 * bars, bars)
         found = headline(result)
         assert (found is not None) is said
         assert not said or found.values == {"scenes": 2, "share": pytest.approx(0.9)}

@@ -8,17 +8,18 @@ import pytest
 from edited import MOON, XML, setup_of_file
 from models import chain
 from PIL import Image
-from trajectory_curves import CASES, DAMPED, FREE, HELD, run_of
+from trajectory_curves import CASES, DAMPED, FREE, HELD, pair_of, run_of
 
 import tmt
 from compare.engines.mujoco import parse
 from compare.engines.mujoco.engine import METHODS
 from compare.engines.tmt import Tmt
+from compare.experiments.runs import follow
 from compare.experiments.trajectory import figures_motion_gif as gif
 from compare.experiments.trajectory import figures_runs, runs
-from compare.experiments.trajectory.runs import Path, TrajectoryResult, path_of
+from compare.experiments.trajectory.pairs import TrajectoryResult
 from compare.judge.rounding import step_rounding
-from compare.judge.run import diverged_at, widest_judged
+from compare.judge.run import widest_judged
 from compare.robots.arm import ARM
 from compare.robots.stick import as_seen, stick_figure
 
@@ -69,13 +70,12 @@ def test_an_open_loop_is_judged_up_to_its_last_state(mujoco):
     name, (_, damped) = "open loop, TMT to MuJoCo", compared(mujoco, DAMPED)
     for share, passes in ((0.9, True), (1.1, False)):
 
-        def moved(case, dynamics, dt, steps, method, share=share):
-            t, path = path_of(case, dynamics, dt, steps, method)
-            q = path.q.copy()
-            q[-1] += share * damped.width[-1, :3] * (method == "RK4")
-            return t, path._replace(q=q)
+        def moved(case, dynamics, setting, method, share=share):
+            run = follow(case, dynamics, setting, method)
+            run.q[-1] += share * damped.width[-1, :3] * (method == "RK4")
+            return run
 
-        checks, _ = compared(mujoco, DAMPED, path_of=moved)
+        checks, _ = compared(mujoco, DAMPED, follow=moved)
         assert checks[name].passed is passes
 
 
@@ -98,8 +98,8 @@ def test_a_step_of_more_than_half_a_turn_is_not_compared_alone(mujoco, rate):
     """Half a turn in 1/64 s is 201 rad/s."""
     case = DAMPED.changed(speed=(np.degrees(rate), 0.0, 0.0), duration=1.0, dt=1 / 64, judged=0.0)
     checks, run = compared(mujoco, case)
-    path, at = run.paths["tmt"], times_of_steps(mujoco, case)
-    alive, v = run.t < (np.inf if path.ended is None else path.ended), np.abs(path.v)
+    path, at = run.runs["tmt"], times_of_steps(mujoco, case)
+    alive, v = run.t < path.ended, np.abs(path.v)
     following = np.append(v[1:].max(axis=1), 0.0)  # within each step: at its end
     slow = np.maximum(v.max(axis=1), following)[alive] / 64 <= np.pi
     assert np.array_equal(at, run.t[alive][slow]) and slow[0] == (rate < 201.1)
@@ -130,14 +130,15 @@ def test_of_a_users_own_scene_nothing_is_expected_but_agreement(mujoco):
 
 
 def test_what_is_kept_of_a_run_is_whose_it_says():
+    """Beside MuJoCo without gravity: a torque that holds pushes the arm away."""
     moon = parse(MOON, tmt.ARM)
-    _, run = compared(moon, HELD)
+    _, pair = compared(moon, HELD)
     motion = moon.of(HELD).run(*HELD.start, HELD.tau, 5 / 64, 64, "RK4")
-    (ours, theirs), ended = run.paths.values(), diverged_at(HELD, motion.t, motion.q, motion.v)
-    assert [*run.paths] == ["tmt", "mujoco"] and (ours.ended, ours.left) == (None, None)
+    ours, theirs = pair.runs.values()
+    assert [*pair.runs] == ["tmt", "mujoco"] and (ours.ended, ours.left) == (np.inf, None)
     for values, expected in ((theirs.q, motion.q), (theirs.v, motion.v)):
         assert np.array_equal(values, expected, equal_nan=True)
-    assert (theirs.ended, theirs.left) == (ended, 5 / 64)
+    assert theirs.left == 5 / 64 and (theirs.ended < np.inf) == (not np.isfinite(motion.q).all())
 
 
 LIGHT = """<mujoco><worldbody><body><joint name="arm" axis="0 1 0" damping="0.1"/><geom size="0.1" pos="0.3 0 0"/>
@@ -149,14 +150,16 @@ def test_a_scheme_that_does_not_bear_the_step_of_a_file_is_compared_in_the_begin
     """RK4, of a joint that decays at 1e5 per s; the others have its damping implicit. A user's own scene stays as it is."""
     setup = setup_of_file(LIGHT)
     case = setup.robot.case("c", duration=1.0, dt=1 / 64, tags=("own",))
-    result, stated = (runs.follow(each, setup.engines, (1,)) for each in (case, case.changed(tags=("user",))))
+    result, stated = (
+        runs.compare_case(each, setup.engines, (1,)) for each in (case, case.changed(tags=("user",)))
+    )
     assert {check.passed for check in result.checks} == {True} and False in {
         check.judged for check in stated.checks
     }
     for row in result.rows:
         dt = pytest.approx(1e-5 if row.engine_integrator == "RK4" else 1 / 64, rel=0.01)
         assert (row.dt, row.judged_until / 64) == (dt, dt)
-    assert {run.scheme for run in result.runs} == {"semi_implicit_euler", "implicit"}
+    assert {pair.scheme for pair in result.pairs} == {"semi_implicit_euler", "implicit"}
     assert {row.engine_integrator for row in result.of_beginnings} == {"RK4"} and stated.of_beginnings == []
 
 
@@ -174,18 +177,18 @@ def test_only_the_beginning_is_compared_where_the_fastest_rate_times_the_step_ex
 
 def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
     schemes = "rk4", "implicit", "discrete"
-    found = [run_of(HELD, 0.1, 0.2, (None, 4.0), scheme=scheme, until=2.5) for scheme in schemes]
-    result = TrajectoryResult("trajectory", runs=found, errors={HELD.name: (0.1, 0.2)})
+    found = [pair_of(HELD, 0.1, 0.2, (None, 4.0), scheme=scheme, until=2.5) for scheme in schemes]
+    result = TrajectoryResult("trajectory", pairs=found, errors={HELD.name: (0.1, 0.2)})
     caption = figures_runs.draw_held(result, found[0], 2)[2].values
     engines = [{"label": "TMT", "left": None, "error": 0.1}, {"label": "MuJoCo", "left": 4.0, "error": 0.2}]
     assert caption["engines"] == engines
-    assert (caption["judged"], caption["apart"]) == (2.5, pytest.approx(0.05))
+    assert (caption["judged"], caption["apart"]) == (2.5, pytest.approx(0.05))  # half of the run
 
     about = {"scene": HELD.name, "level": "open loop"}
     result.rows = [SimpleNamespace(**about, difference_over_band=used) for used in (0.25, None, 0.125)]
     _, fig, caption = figures_runs.draw_run(result, HELD)
     assert caption.values["share"] == 0.25 and {at for _, at in caption.values["judged"]} == {2.5}
-    paths = found[0].paths
+    paths = found[0].runs
     for ax, name in ((fig.axes[0], "q"), (fig.axes[3], "v")):  # movements and speeds of the first scheme
         ours, theirs = (getattr(paths[engine], name)[:, 0] for engine in ("tmt", "mujoco"))
         start = HELD.q[0] if name == "q" else 0.0
@@ -195,7 +198,7 @@ def test_figures_of_a_run_have_the_numbers_of_each_engine_in_their_place():
 
 @pytest.fixture(scope="module")
 def followed(engines):
-    return runs.follow(CATCH, engines, (1, 4)).runs
+    return runs.compare_case(CATCH, engines, (1, 4)).pairs
 
 
 def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_and_up_is_up():
@@ -207,12 +210,13 @@ def test_sticks_go_from_joint_to_joint_and_from_the_last_to_its_centre_of_mass_a
 
 def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(followed, tmp_path):
     """A run of three states: MuJoCo where the arm is let go, then beside tmt, then nowhere."""
-    (run,) = gif.drawn_runs(ARM, followed)
+    (pair,) = gif.drawn_pairs(ARM, followed)
     left, right = ARM.posture("bent"), ARM.posture("zero")
-    paths = {"tmt": Path(np.array([left] * 3), np.zeros((3, 3))),
-             "mujoco": Path(np.array([right, left, left]), np.zeros((3, 3)), ended=2.0)}  # fmt: skip
-    run = replace(run, case=run.case.changed(duration=2.0, dt=1.0), steps=2, t=np.arange(3.0), paths=paths)
-    pictures = list(gif.drawn(run, "TMT"))
+    case = pair.case.changed(duration=2.0, dt=1.0)
+    runs_of = {"tmt": run_of(case, np.array([left] * 3), np.zeros((3, 3))),
+               "mujoco": run_of(case, np.array([right, left, left]), np.zeros((3, 3)), ended=2.0)}  # fmt: skip
+    pair = replace(pair, runs=runs_of)
+    pictures = list(gif.drawn(pair, "TMT"))
     places = []
     for picture in pictures:
         pixels = np.asarray(picture.convert("RGB"), int)[80:-30]  # below the names
@@ -223,6 +227,6 @@ def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(followed, t
     assert [bool(theirs) for _, theirs in places] == [True, True, False] and all(ours for ours, _ in places)
     apart = [np.abs(np.subtract(ours, theirs)).max() for ours, theirs in places[:2]]
     assert apart[0] > 60 and apart[1] < 12  # pixels
-    gif.Animation([run], "TMT").savefig(tmp_path / "motion.gif")
+    gif.Animation([pair], "TMT").savefig(tmp_path / "motion.gif")
     with Image.open(tmp_path / "motion.gif") as image:
         assert (image.n_frames, image.size) == (3, (640, 420))

@@ -12,7 +12,7 @@ from trajectory_curves import CASES
 
 from compare.engines.own import Own
 from compare.experiments.trajectory import cases_left_out
-from compare.experiments.trajectory.runs import follow
+from compare.experiments.trajectory.runs import compare_case
 from compare.judge.scale import EPS
 from compare.robots.case import Case, Scene
 from tmt.compiled import store
@@ -30,7 +30,7 @@ def failing(case, engines, *integrators) -> set:
     """(integrator, level) of the checks that fail; of these integrators, or of all."""
     mujoco, known = copy.copy(engines["mujoco"]), engines["mujoco"].methods_in(case)
     mujoco.methods_in = lambda _: {name: known[name] for name in integrators or known}
-    checks = follow(case, engines | {"mujoco": mujoco}, (1,)).checks
+    checks = compare_case(case, engines | {"mujoco": mujoco}, (1,)).checks
     named = [(check.scene.split(", ")[-2], *check.quantity.split(", "), check.passed) for check in checks]
     compared = [(integrator, level, passed) for integrator, level, *_, passed in named if level in STEPS]
     assert {level for _, level, _ in compared} == STEPS

@@ -70,11 +70,10 @@ EDITS = (
     ("provenance", "commit", "_1 if changed else ''", "''", "changes since a commit are not told"),
     ("words", "scene_of", "max(*_1)", "min(*_1)", "a check is given to the scene of the shortest name"),
     ("words", "digits_of_time", "near and abs(_1) < 0.1 and _2", "False", "a step and the limit near it are the same"),
-    ("trajectory", "find_errors", "min(_1)", "max(_1)", "errors are said to be those of the finest steps"),
     # what is drawn, and said of it
     ("stick", "stick_figure", "joint not in tree.parent", "True", "a stick goes to every centre of mass"),
     ("stick", "as_seen", "[RIGHTWARD, UPWARD]", "[UPWARD, RIGHTWARD]", "up is to the right"),
-    ("figures_runs", "draw_held", "path.left", "run.paths['mujoco'].left", "MuJoCo's departure is told of TMT", 1),
+    ("figures_runs", "draw_held", "run.left", "pair.runs['mujoco'].left", "MuJoCo's departure is told of TMT", 1),
     ("figures_runs", "draw_held", "result.errors[name]", "_0[::-1]", "the caption exchanges the engines"),
     ("figures_runs", "draw_run", "largest_known(_1)", "min(_1)", "the least use of the band is told as the most"),
     ("figures_runs", "over_time", "first[:, i]", "mujoco[:, i]", "MuJoCo's run is drawn as TMT's"),

@@ -24,7 +24,7 @@ EDITS = (
     ("speed.runs", "measure", "spent > budget", "False", "runs of a slow engine have no end"),
     ("speed.runs", "measure", "isinstance(error, TooLong)", "False", "an engine without an answer is asked again"),
     ("speed.runs", "measure", "np.abs(energy - energy[-1])", "0.0 * energy", "no energy is lost"),
-    ("speed.runs", "measured", "reference.t <= EARLY", "reference.t <= 5.0", "the error of the first second is that of all"),
+    ("speed.runs", "measure", "reference.t <= EARLY", "reference.t <= 5.0", "the error of the first second is that of all"),
     ("speed", "compilation", "max(_1, _2)", "_2", "compilation is that of the finest run"),
     ("speed.settings", "methods", "is_regular or _1", "True", "engines that read the file follow all scenes"),
     ("evaluations", "costs", "row.operations / _1", "_1 / row.operations", "a rate is inverted"),
