@@ -98,6 +98,7 @@ class Result:
     top: list[Finding] = field(default_factory=list)  # for the top of the report and for the terminal
     label: str = "TMT"  # of the engine that is compared with MuJoCo
     headline: Finding | None = None  # for the first screen; None: the number of checks that pass
+    repeated: dict[str, Any] = field(default_factory=dict)  # what reproduce.py repeats, as JSON has it
     answer: Finding | None = None  # added to the answers to the assignment's questions that name it
 
     def finding(self, kind: str, of: str = "", **values: Any) -> Finding:

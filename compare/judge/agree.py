@@ -44,6 +44,9 @@ class AgreementRow(Row):
     worst_q: str
     worst_qd: str
     worst_tau: str
+    worst_entry: str  # of the quantity there, from 0
+    worst_value: float | None  # of that entry, by the engine and by MuJoCo
+    mujoco_value: float | None
     passed: bool
 
     def columns(self) -> dict[str, tuple[str, Column]]:
@@ -69,6 +72,10 @@ def agree(
             measured[f"{quantity}, {engine} to exact"] = distance_from_exact(exact, of_engine, scale)
     checks = [check_closest(result, sample, name, unit, *pair) for name, pair in measured.items()]
     (check, worst), (difference, scales) = checks[0], measured[quantity]
+    pair = np.asarray(values)[worst], np.asarray(mujoco_values)[worst]
+    is_worst = np.abs(pair[0] - pair[1]) == difference[worst]
+    entry = tuple(map(int, np.unravel_index(np.argmax(is_worst), is_worst.shape)))
+    numbers = [float(side[entry]) if np.isfinite(side[entry]) else None for side in pair]
     in_eps = (float(np.max(over(sizes, EPS * of_sizes))) for sizes, of_sizes in measured.values())
     row = AgreementRow(
         engine=result.label, scene=sample.name, quantity=quantity, unit=unit, states=len(sample.q),
@@ -76,7 +83,8 @@ def agree(
         worst_difference=check.value, bar=check.tolerance, difference_over_bar=check.over_tolerance,
         scale=float(scales[worst]), exact_states=None if exact is None else len(exact.high),
         worst_state=check.note, worst_q=in_full(sample.q[worst]), worst_qd=in_full(sample.qd[worst]),
-        worst_tau=in_full(sample.tau[worst]), passed=check.passed, **dict(zip(DISTANCES, in_eps)),
+        worst_tau=in_full(sample.tau[worst]), worst_entry=" ".join(map(str, entry)),
+        worst_value=numbers[0], mujoco_value=numbers[1], passed=check.passed, **dict(zip(DISTANCES, in_eps)),
     )  # fmt: skip
     result.rows.append(row)
     result.shown = [name for name, (field, _) in row.columns().items() if field in SHOWN]

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from ..core.rows import Row, columns_of
+from . import reproduce
 from .document import Document
 from .folder import files, save
 from .verdict import Report
@@ -26,6 +27,7 @@ def write(folder: Path, report: Report) -> None:
     document = Document(report)
     save(folder / "report.md", document.text())
     save(folder / "index.html", document.page(folder))
+    save(folder / "reproduce.py", reproduce.script(report))
     results = {
         "passed": report.passed,
         "reference": report.reference,

@@ -163,7 +163,8 @@ def write_report(
         words = f"{block('verdict', 'interrupted', **numbers)}\n{words}"
         left_out |= {name: block("run", "interrupted") for name in interrupted if name not in names}
     named = {"kind": reference.kind, "name": reference.name}
-    about = words, causes, list(left_out.items()), named, reference.lines, not interrupted
+    plain = compared.mujoco.plain(robot.case())
+    about = words, causes, list(left_out.items()), named, reference.lines, plain, not interrupted
     report = verdict.Report(sections, robot, origin, *about)
     files.write(folder, report)
     return report

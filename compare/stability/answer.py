@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -116,6 +116,7 @@ class Question(NamedTuple):
 class Answer(NamedTuple):
     """Rows, in the order of the integrators; steps that were tried; remedies; what stops a creep.
 
+    recipes: of the runs at the longest stable step in use, and at the first that fails.
     smaller: where the step in use fails, the largest smaller push after which the limit is longer, and that limit.
     """
 
@@ -123,6 +124,7 @@ class Answer(NamedTuple):
     tried: list[TriedRow]
     remedies: list[Remedy]
     stops: list[Remedy]
+    recipes: list[dict[str, Any]]
     smaller: tuple[float, float] | None
 
     @property
@@ -157,7 +159,14 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
         )
         for (push, dt, name, *_), verdict in pushed.tried.items()
     ]  # fmt: skip
-    return Answer(rows, tried, found, stops, smaller)
+    return Answer(rows, tried, found, stops, recipes_of(pushed, own), smaller)
+
+
+def recipes_of(pushed: Pushed, row: StepLimitRow | None) -> list[dict[str, Any]]:
+    """The recipes of the runs at the limits of a row, see Pushed.recipe."""
+    limits = {False: row.stable_up_to_s, True: row.fails_at_s} if row and row.of == "step" else {}
+    found = [pushed.recipe(dt, pushed.integrator, fails) for fails, dt in limits.items() if dt]
+    return [recipe for recipe in found if recipe]
 
 
 def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:

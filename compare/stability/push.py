@@ -20,7 +20,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -309,6 +309,37 @@ class Pushed:
         dof = int(last.argmax()) if of is None else of
         return (float(last[dof]), dof) if last[dof] > 0.5 * before[dof] else (0.0, 0)
 
+    def recipe(self, dt: float, integrator: str, fails: bool) -> dict[str, Any] | None:
+        """How plain MuJoCo repeats the run that decides on a step: its start, its steps, and the speed at its end.
+
+        It is the first that fails, else the fastest at its end. fails: of a step that does, perhaps after a further pattern.
+        None: controls change on the way.
+        """
+        if self.motion.program or len(self.motion.times):
+            return None
+        fine, is_chance = [self.fine_run(self.push, way) for way in range(WAYS)], self.place_is_chance(self.push)
+        fast, found = max(FAST, 10.0 * float(max(run.most.max() for run in fine))), list[tuple[str, int, Run]]()
+        for way, beside in enumerate(fine):
+            run = self.run(self.push, way, dt, integrator, fast=fast)
+            found.append((self.failure(run, beside, self.push, is_chance), way, run))
+        if fails and not any(why for why, _, _ in found):
+            more = range(WAYS, WAYS + MORE_WAYS)
+            further = zip(more, self.further(self.push, dt, integrator, more))
+            found += [(why, way, run) for way, (why, _, run) in further]
+        failing = [each for each in found if each[0]]
+        _, way, run = failing[0] if failing else max(found, key=lambda each: float(each[2].last.max()))
+        count = round((self.lasts if way < WAYS else SURELY * self.lasts) / dt)
+        done, over = len(run.speeds), 1
+        if run.is_finite:
+            over = round(CALM / dt) if done < count else max(1, count // 4)
+        with np.errstate(invalid="ignore"):
+            speed = float(run.speeds[done - over :].max())
+        state = self.motion.state.copy()
+        state[self.stepper.places["qvel"]] += self.push * self.signs[way]
+        known = speed if np.isfinite(speed) else None
+        of_run = {"integrator": integrator, "dt": dt, "steps": done, "over": over, "speed": known}
+        return of_run | {"start": self.stepper.as_fields(state)}
+
     # other steps
 
     def verdict(
@@ -359,8 +390,8 @@ class Pushed:
 
     def further(
         self, push: float, dt: float, integrator: str, ways: range
-    ) -> Iterator[tuple[str, int, float]]:
-        """How runs of further patterns fail, or "", what moves first, and the speed at the end.
+    ) -> Iterator[tuple[str, int, Run]]:
+        """How runs of further patterns fail, or "", what moves first, and the runs.
 
         They are judged beside the fine runs of the first patterns, of which the fastest counts.
         """
@@ -373,11 +404,7 @@ class Pushed:
         lasts = self.lasts if len(self.motion.times) else SURELY * self.lasts
         for way in ways:
             run = self.run(push, way, dt, integrator, fast=fastest, lasts=lasts)
-            yield (
-                self.failure(run, whole, push, is_chance),
-                self.first(run, most, push),
-                float(run.last.max()),
-            )
+            yield self.failure(run, whole, push, is_chance), self.first(run, most, push), run
 
     def first(self, run: Run, most: np.ndarray, push: float) -> int:
         """The degree of freedom that is first faster than fine runs ever are, else the fastest at the end."""
@@ -390,9 +417,9 @@ class Pushed:
         if not verdict.holds or key in self.surely:
             return verdict.holds
         more = MORE_WAYS if self.rests else MORE_WAYS // 2  # what falls is no more certain with more of them
-        for why, dof, speed in self.further(push, dt, integrator, range(WAYS, WAYS + more)):
+        for why, dof, run in self.further(push, dt, integrator, range(WAYS, WAYS + more)):
             if why:
-                self.tried[key] = verdict._replace(why=why, dof=dof, speed=max(speed, verdict.speed))
+                self.tried[key] = verdict._replace(why=why, dof=dof, speed=max(float(run.last.max()), verdict.speed))
                 return False
         self.surely.add(key)
         return True

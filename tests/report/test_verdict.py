@@ -158,7 +158,7 @@ PRINTED = PrintedRow(item="c", posture="zero", quantity="qdd", component="alpha"
 AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2", states=1, largest_difference=2e-16,
                       worst_difference=2e-16, bar=2e-15, difference_over_bar=0.1, scale=1.0, difference=2.0, from_exact=1.0,
                       mujoco_from_exact=4.0, exact_states=1, worst_state="", worst_q="", worst_qd="", worst_tau="",
-                      passed=True)  # fmt: skip
+                      worst_entry="", worst_value=0.0, mujoco_value=0.0, passed=True)  # fmt: skip
 
 
 @pytest.mark.parametrize("name, rows, numbers, named", [

@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from pathlib import Path
 from typing import Any
 
 import mujoco
+import numpy as np
 
 from tmt import Tree
 from tmt.methods import isolated_speeds
@@ -12,7 +14,7 @@ from tmt.methods import isolated_speeds
 from ...robots.case import Case
 from .. import Engine, Method
 from .dynamics import MujocoDynamics
-from .inventory import switch_off
+from .inventory import NOT_HAD_FIELDS, switch_off
 from .names import FROM_4, INTEGRATORS, bit, rotors
 from .source import Source
 
@@ -73,6 +75,23 @@ class Mujoco(Engine):
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         return methods_for(case.tree) if case.controller else self.methods
+
+    def plain(self, case: Case) -> dict[str, Any]:
+        """How MuJoCo alone, with the file as it is, evaluates the states of a case; as JSON has it.
+
+        qpos: positions, with the places of the case's joints in them; dofs: those of their speeds. zero: fields of the model
+        to be set to zero, where all that a Tree does not have is switched off, else None. gravity: of the equations, m/s2.
+        mass_alone: M follows from masses, tensors and armature of joints alone. why: why MuJoCo does not read this file.
+        """
+        dynamics, m, source = self.of(case), self.source.model, self.source
+        zero = [name for name in (*NOT_HAD_FIELDS, "tendon_armature") if np.any(getattr(m, name, 0.0))]
+        why = "floating" if source.floating else "meshes" if source.missing else ""
+        return {
+            "first": dynamics.data.qpos.tolist(), "qpos": dynamics.qpos.tolist(), "dofs": dynamics.dofs.tolist(),
+            "zero": zero if self.bare else None, "gravity": dynamics.model.opt.gravity.tolist(),
+            "mass_alone": not rotors(m).any() and (self.bare or not np.any(m.tendon_armature)),
+            "why": why if isinstance(source.origin, Path) else "no file",
+        }  # fmt: skip
 
     def of(self, case: Case) -> MujocoDynamics:
         """The dynamics of a case: the file's own numbers with the changes of the case.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -267,6 +267,22 @@ class Scene:
     def error(self, small: "Smaller", from_keys: bool = False) -> float:
         """How far a model is from the whole one, rad or m; inf where its run fails."""
         return apart(self.run(small, from_keys), self.paths, self.points)
+
+    def recipe(self, small: "Smaller", file: str, error: float) -> dict[str, Any] | None:
+        """How plain MuJoCo repeats the error of a file with a smaller model, rad or m; None: controls change on the way.
+
+        places: of the whole model's positions, those that the smaller one has. Each motion starts from a keyframe of its name.
+        """
+        if self.points or any(roll.controls is not None for roll in self.rolls):
+            return None
+        of_whole = joints(self.whole.model)
+        places = [k for name in joints(small.model) for k in range(self.whole.model.nq)[of_whole[name][0]]]
+        return {
+            "file": file, "dt": self.stepper.dt, "integrator": self.stepper.integrator, "places": places, "error": error,
+            "motions": [
+                {"key": roll.name, "steps": roll.steps, "start": self.stepper.as_fields(roll.state)} for roll in self.rolls
+            ],
+        }  # fmt: skip
 
     def starts(self, small: "Smaller") -> Iterator[tuple[str, mujoco.MjData]]:
         """The names of the motions, and in turn the data of a model at their starts."""

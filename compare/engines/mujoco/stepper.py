@@ -117,6 +117,12 @@ class Stepper:
         self.data.warning.number[:] = 0
         return self.data
 
+    def as_fields(self, state: Array) -> dict[str, list[float]]:
+        """A state, (n,), as fields of MjData that are not zero; without memories of delays and of plastic springs."""
+        data = self.put(state)
+        names = "qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat", "qfrc_applied"
+        return {name: getattr(data, name).ravel().tolist() for name in names if getattr(data, name).any()}
+
     # runs
 
     def watch(self, state: Array, steps: int, act: Act | None = None) -> Iterator[mujoco.MjData]:

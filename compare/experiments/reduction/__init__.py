@@ -1,5 +1,6 @@
 """What does a motion not need: elements that never act, for nothing, and joints, for an error that is allowed?"""
 
+import os
 import time
 from collections.abc import Iterator
 from functools import partial
@@ -125,6 +126,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
         is_written = bool(write) and all(check.passed for check in result.checks)
         if write and is_written:
             move(draft, Path(write))
+            result.repeated["smaller"] = scene.recipe(model, shown_path(write), error)
     for row in locks.rows:
         row.locked = row.joint in names
     setup.quiet()
@@ -144,6 +146,12 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
         written=write if is_written else "", refused=write and not is_written,
         assets=assets_of(draft).name if files_of(model.spec) else "",
     ))  # fmt: skip
+
+
+def shown_path(path: str) -> str:
+    """A path below the current folder from there."""
+    relative = os.path.relpath(path)
+    return path if relative.startswith(os.pardir) else relative
 
 
 def timed_models(scene: Scene, locks: Locks, elements: int) -> list[ModelRow]:

@@ -73,6 +73,7 @@ def add(result: StabilityResult, work: Work) -> None:
     result.filed = ["stability_runs"]
     for found in answers:
         check(result, found.rows[0], work.quantity)
+    result.repeated["runs"] = answers[0].recipes
     first, others = answers[0], [found.rows[0] for found in answers[1:]]
     tell(result, "answer", row=first.rows[0], rows=first.rows if work.is_alone else [])
     if work.error is not None:

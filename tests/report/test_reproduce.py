@@ -1,0 +1,139 @@
+"""reproduce.py of a report: plain MuJoCo and NumPy repeat its numbers, and a wrong one is found."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from in_process import without_workers
+from models import PATHS
+from runs import ROOT
+
+from compare.__main__ import main
+
+# what the script may not need: this project, and all that it is built on but MuJoCo and NumPy
+ALONE = """
+import sys, runpy
+class Blocked:
+    def find_spec(self, name, *rest):
+        if name.split(".")[0] in ("compare", "tmt", "mjcf", "scipy", "pandas", "jinja2", "matplotlib", "llvmlite"):
+            raise ImportError(f"{name} is not installed")
+sys.meta_path.insert(0, Blocked())
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+ROD = '<inertial pos="0 0.02 -0.5" mass="1" fullinertia="0.1 0.11 0.02 0.001 0.002 0.003"/>'
+SWING = f"""<mujoco><option integrator="Euler" gravity="0.5 0 -9.81"/><worldbody><body euler="10 20 30"><joint name="hip"
+axis="0 1 0" damping="0.3" pos="0 0 0.1" armature="0.02"/>{ROD}<body pos="0 0.1 -1" euler="0 0 40"><joint name="knee"
+axis="0 1 0" ref="20" stiffness="2" frictionloss="0.1"/>{ROD}<body pos="0 0 -1"><joint name="slide" type="slide" axis="1 0 1"
+stiffness="50" damping="1"/>{ROD}<body name="ball" pos="0.1 0 0"><joint type="ball" damping="0.5"/>{ROD}</body></body></body>
+</body></worldbody><actuator><position joint="hip" kp="500" kv="1"/></actuator></mujoco>"""
+STIFF = SWING.replace('ref="20" stiffness="2"', 'stiffness="900" damping="2"')
+WRONG = """
+from numpy import cos
+def bias(q, qd): return [0.0, 0.0]
+def mass_matrix(q): return [[1.7 + cos(q[1]), 0.35 + 0.5 * cos(q[1])], [0.35 + 0.5 * cos(q[1]), 0.36]]
+"""
+PENDULUM = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/><inertial pos="0 0 -0.5" mass="1"
+diaginertia="0.1 0.1 0.01"/><body pos="0 0 -1"><joint name="knee" axis="0 1 0"/><inertial pos="0 0 -0.5" mass="1"
+diaginertia="0.1 0.1 0.01"/></body></body></worldbody></mujoco>"""
+
+
+def repeated(script, *arguments, cwd=ROOT):
+    """The exit status and the lines of a script, by an interpreter that has MuJoCo and NumPy alone."""
+    command = [sys.executable, "-I", "-c", ALONE, str(script), *map(str, arguments)]
+    run = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120, check=False)
+    assert run.stderr == ""
+    return run.returncode, run.stdout.splitlines()
+
+
+def report_of(tmp_path, *words, status=0):
+    out = tmp_path / "out"
+    with without_workers():
+        assert main([*words, "--quick", "--out", str(out)]) == status
+    return out / "reproduce.py"
+
+
+@pytest.mark.parametrize("name, experiment", [
+    ("swing", "acceleration"), ("swing", "mass"), ("mixed", "acceleration"), ("free_body", "gravity"), ("arm", "acceleration"),
+])  # fmt: skip
+def test_the_worst_states_of_any_joints_are_repeated(name, experiment, tmp_path, capsys):
+    """With armature, springs, friction and servos that the equations do not have, and M and weight without an engine."""
+    (tmp_path / "swing.xml").write_text(SWING)
+    given = [] if name == "arm" else ["--mjcf", str(PATHS.get(name, tmp_path / "swing.xml"))]
+    script = report_of(tmp_path, experiment, *given)
+    status, lines = repeated(script)
+    quantities = {"mass": ["Mbar"], "gravity": ["holding torque"], "acceleration": ["bias", "qdd"]}[experiment]
+    assert status == 0 and all(line.endswith("; the same") for line in lines), lines
+    assert [line.split(" [")[0] for line in lines[: 2 * len(quantities) : 2]] == quantities
+    assert sum("by NumPy alone" in line for line in lines) == 2
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """The script of states, of a run that is stable up to some step, and of one with a smaller file."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "mass.xml").write_text(SWING)
+    (folder / "reduction.xml").write_text(SWING)
+    (folder / "stability.xml").write_text(STIFF)
+    scripts = {}
+    for name, more in {"mass": [], "stability": [], "reduction": ["--write", str(folder / "small.xml")]}.items():
+        (folder / name).mkdir()
+        scripts[name] = report_of(folder / name, name, "--mjcf", str(folder / f"{name}.xml"), *more)
+    return scripts
+
+
+@pytest.mark.parametrize("name, count", [("stability", 2), ("reduction", 1)])
+def test_the_runs_at_the_limits_and_the_error_of_a_written_file_are_repeated(name, count, runs):
+    status, lines = repeated(runs[name])
+    assert status == 0 and len(lines) == count and all(line.endswith("; the same") for line in lines), lines
+
+
+def test_a_difference_of_equations_is_repeated_and_numpy_sides_with_mujoco(tmp_path, capsys):
+    (tmp_path / "swing.xml").write_text(PENDULUM)
+    (tmp_path / "own.py").write_text(WRONG)
+    words = "--mjcf", str(tmp_path / "swing.xml"), "--reference", f"{tmp_path / 'own.py'}:"
+    status, lines = repeated(report_of(tmp_path, "mass", *words, status=1))
+    assert status == 0 and re.search(r"Mbar \[1, 1\], difference: 0\.01\d*; the report: 0\.01\d*; the same", lines[1])
+    assert all(line.endswith("the same") for line in lines[2:]) and "by NumPy alone" in lines[2]
+
+
+@pytest.mark.parametrize("pattern", [
+    r'"mujoco": (-?\d\.\d+)', r'"other": (-?\d+\.\d+)', r'"difference": (\S+),', r'"speed": (\S+),', r'"error": (\S+),'
+])  # fmt: skip
+def test_a_wrong_number_of_the_script_is_found(pattern, runs, tmp_path, capsys):
+    """By 1 % of it; a difference by more than its tolerance."""
+    kind = {"speed": "stability", "error": "reduction"}.get(pattern[1:].split('"')[0], "mass")
+    script = runs[kind]
+    text = script.read_text(encoding="utf-8")
+    found = re.search(pattern, text)
+    number = 1.01 * float(found[1]) + (1e-9 if "difference" in pattern else 0.0)
+    changed = text[: found.start(1)] + repr(number) + text[found.end(1) :]
+    (tmp_path / "changed.py").write_text(changed)
+    status, lines = repeated(tmp_path / "changed.py")
+    assert status == 1 and any("NOT THE SAME" in line for line in lines)
+
+
+@pytest.mark.parametrize("name", ["mass", "reduction"])
+def test_a_wrong_number_of_the_report_is_found(name, runs):
+    script = runs[name]
+    path = script.with_name("results.json")
+    text = path.read_text(encoding="utf-8")
+    results = json.loads(text)
+    said = [check for check in results["checks"] if check["value"] and f'"value": {check["value"]!r}' in script.read_text()]
+    assert said and repeated(script)[0] == 0
+    said[-1]["value"] *= 1.001
+    path.write_text(json.dumps(results), encoding="utf-8")
+    status, lines = repeated(script)
+    path.write_text(text, encoding="utf-8")
+    assert status == 1 and sum("not in results.json" in line for line in lines) == 1
+
+
+def test_a_file_that_mujoco_alone_reads_otherwise_is_said(tmp_path, capsys):
+    urdf = """<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0"
+    iyz="0"/></inertial></link></robot>"""
+    (tmp_path / "r.urdf").write_text(urdf)
+    script = report_of(tmp_path, "mass", "--mjcf", str(tmp_path / "r.urdf"), "--floating")
+    run = subprocess.run([sys.executable, "-I", str(script)], capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 1 and "floating" in run.stderr
