@@ -16,5 +16,5 @@ def test_positions_are_equation_1_and_angular_velocities_the_stated_B(rng):
     formulas = sympy.lambdify([*q, d, e], [x1, x2, B1, B2])
     for angles in rng.uniform(-np.pi, np.pi, (20, 3)):
         *x, B1, B2 = formulas(*angles, 0.15, 0.15)
-        assert np.allclose(tmt.com_positions(angles), np.array(x)[:, :, 0], atol=1e-15)
-        assert np.allclose(tmt.jacobians(angles)[1], [B1, B2], atol=1e-15)
+        assert np.allclose(tmt.com_positions(tmt.ARM, angles), np.array(x)[:, :, 0], atol=1e-15)
+        assert np.allclose(tmt.jacobians(tmt.ARM, angles)[1], [B1, B2], atol=1e-15)

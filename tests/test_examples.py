@@ -71,9 +71,9 @@ def test_an_example_runs_and_says_what_it_finds(path, tmp_path, monkeypatch, cap
     assert len(text.partition('"""\n')[0].splitlines()) == 2 and len(text.splitlines()) <= 40
 
 
-SECTION = re.compile(r"(?ms)^ *(?:Parameters|Attributes)\n +-+\n(.*?)(?=\n *\n +\w+\n +-+\n|\Z)")
+SECTION = re.compile(r"(?ms)^ *(?:Parameters|Attributes)\n *-+\n(.*?)(?=\n *\n *\w+\n *-+\n|\Z)")
 FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
-OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Motion, Difference]
+OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Tree.from_joints, tmt.Motion, Difference]
 OTHERS += [getattr(compare, name) for name in compare.__all__]
 
 
@@ -83,10 +83,7 @@ def test_examples_are_right_and_every_argument_is_described(public):
     (found,) = doctest.DocTestFinder(recurse=False).find(public, public.__qualname__, globs=names)
     assert doctest.DocTestRunner().run(found).failed == 0 and (found.examples or public is Difference)
     arguments = {*inspect.signature(public).parameters} - {"self"}
-    if section := SECTION.search(public.__doc__):
-        lines = inspect.cleandoc("\n" + section[1]).splitlines()
-        described = [line.split(" : ")[0] for line in lines if not line.startswith(" ")]
-        assert {name.strip("* ") for names in described for name in names.split(",")} == arguments
-    else:  # of a state: shapes and units in a line; the help of tmt says what a model is
-        described = re.findall(r"(\w+)(?: \(\.\.\.|: )", public.__doc__)
-        assert arguments - {"model"} <= {*described} and "rad" in public.__doc__ and "`model`" in tmt.__doc__
+    (section,) = SECTION.findall(public.__doc__)
+    lines = inspect.cleandoc("\n" + section).splitlines()
+    described = [line.split(" : ")[0] for line in lines if not line.startswith(" ")]
+    assert {name.strip("* ") for names in described for name in names.split(",")} == arguments

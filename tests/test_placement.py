@@ -63,11 +63,11 @@ def test_what_moves_as_stated_is_compared_in_its_place_and_said_to_be_otherwise(
     assert says in " ".join(lines) and lines[1:] == compared.reference.otherwise
     tree, mujoco, (q, qd, tau) = compared.robot.tree, compared.mujoco.of(compared.robot.case()), STATES
     for mine in (tmt.ARM, tree):  # which is moved, and has the same equations
-        assert np.abs(mujoco.mass_matrix(q) - tmt.mass_matrix(q, mine)).max() < 1e-14
-        assert np.abs(mujoco.acceleration(q, qd, tau) - tmt.acceleration(q, qd, tau, mine)).max() < 1e-11
+        assert np.abs(mujoco.mass_matrix(q) - tmt.mass_matrix(mine, q)).max() < 1e-14
+        assert np.abs(mujoco.acceleration(q, qd, tau) - tmt.acceleration(mine, q, qd, tau)).max() < 1e-11
     if name != "massless":
-        assert np.abs(mujoco.com_positions(q) - tmt.com_positions(q, tree)).max() < 1e-14
-        energies = mujoco.energy(q, qd) - tmt.energy(q, qd, tree)
+        assert np.abs(mujoco.com_positions(q) - tmt.com_positions(tree, q)).max() < 1e-14
+        energies = mujoco.energy(q, qd) - tmt.energy(tree, q, qd)
         assert np.abs(energies).max() < 1e-12
 
 
@@ -107,7 +107,7 @@ def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
     wrist = CART.replace('pos="0 0.01 0"', 'pos="0 0.02 0"')
     placement = placed(tree, read(CART.replace('name="rail"', 'name="rail" pos="0 1 2"')).tree)
     assert placement.along == ("rail",) and not placement.is_moved and not placement.is_turned
-    assert np.abs(tmt.mass_matrix(q, placement.tree) - tmt.mass_matrix(q, tree)).max() < 1e-14
+    assert np.abs(tmt.mass_matrix(placement.tree, q) - tmt.mass_matrix(tree, q)).max() < 1e-14
     assert placed(tree, read(wrist).tree).is_same
 
 

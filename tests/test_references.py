@@ -53,7 +53,7 @@ def test_joints_of_other_names_are_matched_by_place_axis_and_type(tmp_path, aske
     assert reference.renamed == tuple(f"{b} as {a}" for a, b in zip(ARM.joints, names) if a != b)
     q, qd = np.array([0.3, -0.2, 0.9]), np.array([1.0, 2.0, -3.0])
     theirs = mujoco.of(robot.case()).bias(q, qd)
-    assert (np.abs(theirs - tmt.bias(q, qd)).max() < 1e-12) == (text == RENAMED)
+    assert (np.abs(theirs - tmt.bias(tmt.ARM, q, qd)).max() < 1e-12) == (text == RENAMED)
     assert robot.stated_in == (asked if asked != "arm" else "") and robot.is_stated
 
 

@@ -52,7 +52,7 @@ def test_both_engines_start_every_scene_alike(name):
     robot, mujoco = robot_of(reading, "robot.xml"), engine(reading)
     assert all("own" in scene.tags and scene.judged == 0.0 for scene in robot.scenes)
     for case in robot.cases:
-        ours = tmt.acceleration(*case.start, case.tau, case.tree)
+        ours = tmt.acceleration(case.tree, *case.start, case.tau)
         theirs = mujoco.of(case).acceleration(*case.start, case.tau)
         assert np.abs(ours - theirs).max() <= 1e-9 * (1.0 + np.abs(ours).max())
         assert np.abs(ours).max() < 1e-6 or not case.is_held
@@ -89,7 +89,7 @@ def test_what_rests_where_it_is_let_go_is_set_going():
     names = [scene.name for scene in robot_of(file_of(still), "my.xml").scenes]
     assert names == ["qpos0, set going", "qpos0, set going, damped"]
     zero = np.zeros(3)
-    fastest = np.abs(tmt.acceleration(zero, zero, zero, replace(still, gravity=(0.0, 0.0, -1.0)))).max()
+    fastest = np.abs(tmt.acceleration(replace(still, gravity=(0.0, 0.0, -1.0)), zero, zero, zero)).max()
     for share, found in ((0.99, "set going"), (1.01, "let go")):  # of what is seen to move
         tree = replace(still, gravity=(0.0, 0.0, -share * 1e-6 / fastest))
         assert scenes_from(tree, "qpos0", zero, 0.002, None)[-1].name == f"qpos0, {found}, damped"
@@ -98,7 +98,7 @@ def test_what_rests_where_it_is_let_go_is_set_going():
 @pytest.mark.parametrize("sign, how", [(1.0, "set going"), (-1.0, "held")])
 def test_what_a_spring_holds_rests(sign, how):
     """The forearm, whose weight is the spring's torque k (q - rest), or is beside it."""
-    rest = sign * tmt.gravity_balance(np.zeros(1), FOREARM) / 2.0
+    rest = sign * tmt.gravity_balance(FOREARM, np.zeros(1)) / 2.0
     spring = replace(FOREARM, stiffness=(2.0,), rest=rest)
     assert scenes_from(spring, "qpos0", np.zeros(1), 0.002, None)[0].name == f"qpos0, {how}"
 
@@ -111,7 +111,7 @@ def test_methods_are_compared_with_servos_that_8192_steps_follow(share, passes):
 
 
 def test_steps_are_four_of_the_files_own_and_no_longer_than_the_fastest_rate():
-    inertia = float(tmt.mass_matrix(np.zeros(1), ONE)[0, 0])
+    inertia = float(tmt.mass_matrix(ONE, np.zeros(1))[0, 0])
     inverse = np.array([[1.0 / inertia]])
 
     def count(dt, rate=0.0, swing=0.0, added=()):

@@ -130,4 +130,4 @@ def test_cases_that_differ_in_one_change_have_their_own_models():
     for case in cases[::-1] + cases:
         q, v = np.full((2, len(case.joints)), 0.7)
         found = engine.of(case).acceleration(q, v, v)
-        assert np.allclose(found, tmt.acceleration(q, v, v, case.tree), rtol=1e-10, atol=1e-10), case.scene
+        assert np.allclose(found, tmt.acceleration(case.tree, q, v, v), rtol=1e-10, atol=1e-10), case.scene

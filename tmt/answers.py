@@ -4,36 +4,62 @@ Nothing depends on earlier calls: the same call gives the same bits. Compiled co
 wrong with what is given; whatever is, the literal form says.
 """
 
+import inspect
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy import ndarray
 from numpy.typing import ArrayLike
 
 from tmt import literal
-from tmt.arm import ARM
 from tmt.compiled.evaluator import SMALL, Evaluator
 from tmt.derivation.quantities import PLAIN, QUANTITIES, quantity_of
 from tmt.model import singular
 from tmt.model.tree import Tree, checked_model
 from tmt.model.values import real_numbers
 
+PARAMETERS = {
+    "model": "Tree",
+    "q": "(..., nq), rad, of slides m, of balls quaternions w, x, y, z",
+    "qd": "(..., nv), rad/s, of slides m/s",
+    "tau": "(..., nv), N m, of slides N",
+    "qdd": "(..., nv), rad/s2, of slides m/s2",
+}
 MOST = 64  # models that are held, besides those that are prepared
 DOUBLE = np.dtype(float)
+Function = TypeVar("Function", bound=Callable[..., Any])
 prepared: dict[Tree, "Answers"] = {}
 
 
+def documented(function: Function) -> Function:
+    """Add the sections on parameters and errors, which all functions of a state share, to a docstring."""
+    text = inspect.getdoc(function)
+    if text is None:  # python -OO
+        return function
+    lines = [f"{name} : {PARAMETERS[name]}" for name in inspect.signature(function).parameters]
+    solved = " a singular Mbar," if literal.is_solved(function.__name__) else ""
+    wrong = f"For wrong shapes, values that are not finite,{solved} results beyond the largest double."
+    before, returns, after = text.partition("Returns\n-------\n")
+    values, _, examples = after.partition("\n\n")
+    parts = [
+        "Parameters\n----------\n" + "\n".join(lines), returns + values, f"Raises\n------\nValueError\n    {wrong}",
+        examples,
+    ]  # fmt: skip
+    function.__doc__ = before + "\n\n".join(parts)
+    return function
+
+
 def answered(quantity: str, model: Tree, *arguments: ArrayLike) -> Any:
-    """The quantity of states of any batch shape, given as the function in literal.py takes them."""
+    """The quantity of states of any batch shape, given as the function of its name takes them."""
     if isinstance(model, Tree):
         answers = prepared.get(model) or recent(model)
         result = answers.by_machine_code(quantity, arguments)
         if result is not None:
             return result
-    return literal.literal(quantity)(*arguments, model)
+    return literal.literal(quantity)(model, *arguments)
 
 
 @lru_cache(maxsize=MOST)
@@ -41,7 +67,7 @@ def recent(model: Tree) -> "Answers":
     return Answers(model)
 
 
-def prepare(model: Tree = ARM, *quantities: str) -> None:
+def prepare(model: Tree, *quantities: str) -> None:
     """Have machine code answer all calls of a model from now on: for many calls, in a loop or a controller.
 
     Without it NumPy answers those of up to 500 states, ten times as slowly; the last bits differ. The first
@@ -50,7 +76,7 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
 
     Parameters
     ----------
-    model : Tree, default ARM
+    model : Tree
     *quantities : names of functions of `tmt`; without any all but derivatives and what has an argument
         That stands after a colon: "step_derivatives:rk4", and for `frame` of a body or site NAME
         "frame_pose:NAME", "frame_jacobian:NAME" and "frame_convective:NAME".
@@ -59,7 +85,7 @@ def prepare(model: Tree = ARM, *quantities: str) -> None:
     --------
     >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
     >>> tmt.prepare(forearm)
-    >>> print(tmt.gravity_balance([0.0], forearm).round(9))  # -1.5 9.81 0.15
+    >>> print(tmt.gravity_balance(forearm, [0.0]).round(9))  # -1.5 9.81 0.15
     [-2.20725]
     """
     checked_model(model)

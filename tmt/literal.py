@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt.arm import ARM
 from tmt.derivation.quantities import PLAIN, State, argument_of, quantity_of
 from tmt.derivation.vectors import Rows, Scalar, Values, added
 from tmt.methods import METHODS, SemiImplicitEuler, method_named, transition
@@ -30,16 +29,15 @@ def __getattr__(name: str) -> Callable[..., Any]:
 
 
 def literal(name: str) -> Callable[..., Any]:
-    """The quantity of that full name as a function of what it takes and a model."""
+    """The quantity of that full name as a function of a model and what it takes."""
     takes = quantity_of(name).takes
 
-    def function(*arguments: Any, model: Tree = ARM) -> Any:
-        arrays, last = arguments[: len(takes)], arguments[len(takes) :]
-        if len(arrays) < len(takes) or len(last) > 1:
-            raise TypeError(f"{name} takes {', '.join(takes)} and a model")
+    def function(model: Tree, *arrays: Any) -> Any:
+        if len(arrays) != len(takes):
+            raise TypeError(f"{name} takes a model and {', '.join(takes)}")
         try:
             with np.errstate(all="ignore"):  # of warnings, which no caller can place
-                return answer(name, last[0] if last else model, dict(zip(takes, arrays)))
+                return answer(name, model, dict(zip(takes, arrays)))
         except MemoryError as error:
             raise ValueError(f"{name} of these states does not fit into memory: {error}") from None
 

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from tmt.arm import ARM
 from tmt.compiled.runner import Ended, Runner, runner_of
 from tmt.methods.stepping import DIVERGED, MANY, MOST_EVALUATIONS, NEWTON, SMALL
 from tmt.model import singular, values
@@ -38,7 +37,7 @@ class Motion(_Path):
 
     Examples
     --------
-    >>> motion = tmt.simulate([0.0] * 3, [0.0] * 3, [0.0] * 3, dt=0.01, steps=10)
+    >>> motion = tmt.simulate(tmt.ARM, [0.0] * 3, [0.0] * 3, [0.0] * 3, dt=0.01, steps=10)
     >>> print(motion.ended, motion.evaluations)  # four stages in each step
     None 40
     """
@@ -56,8 +55,8 @@ class Motion(_Path):
 
 
 def simulate(
-    q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4",
-    model: Tree = ARM, tolerance: float | None = None, every: int = 1,
+    model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4",
+    tolerance: float | None = None, every: int = 1,
 ) -> Motion:  # fmt: skip
     """Motion under constant torque: t (records,), s; q (..., records, nq), rad; qd (..., records, nv), rad/s.
 
@@ -68,6 +67,7 @@ def simulate(
 
     Parameters
     ----------
+    model : Tree
     q, qd : (..., nq) and (..., nv), rad and rad/s, state at t = 0
     tau : (..., nv), N m, torque
     dt : float, s, step, above 0
@@ -75,7 +75,6 @@ def simulate(
     method : str, a key of METHODS, or "taylor": the true motion, rounded once
         That is a Taylor series in pairs of doubles, whose evaluations are its steps. An adaptive method takes
         its own steps between those.
-    model : Tree, default ARM
     tolerance : float, default 1e-9, of "taylor" 1e-33
         Of adaptive methods: the error of each step, in units of 1 + |value|.
     every : int, default 1
@@ -84,7 +83,7 @@ def simulate(
     Examples
     --------
     >>> start = np.array([0.5, 0.3, 1.0])
-    >>> t, q, qd = tmt.simulate(start, [0.0] * 3, tmt.gravity_balance(start), dt=0.01, steps=100)
+    >>> t, q, qd = tmt.simulate(tmt.ARM, start, [0.0] * 3, tmt.gravity_balance(tmt.ARM, start), dt=0.01, steps=100)
     >>> print(t[-1], q.shape, abs(q - start).max() < 1e-12)  # it is held
     1.0 (101, 3) True
     """

@@ -41,7 +41,7 @@ def tree(mjcf: str | PathLike[str] | Any, *, floating: bool = False) -> tmt.Tree
     >>> inertia = '<inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/><site name="tip" pos="0 0 -1"/>'
     >>> mjcf = f'<mujoco><worldbody><body><joint name="hip" axis="0 1 0"/>{inertia}</body></worldbody></mujoco>'
     >>> pendulum = compare.tree(mjcf)
-    >>> print(tmt.frame("tip", [np.pi / 2], model=pendulum).position.round(9) + 0.0)
+    >>> print(tmt.frame(pendulum, "tip", [np.pi / 2]).position.round(9) + 0.0)
     [-1.  0.  0.]
     """
     from ..engines.mujoco import Source, read, tree_with_sites  # here: `import compare` need not wait for it

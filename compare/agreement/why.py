@@ -66,12 +66,12 @@ class Affine(NamedTuple):
     def bias(self, q: ndarray, M: ndarray, qd: ndarray) -> ndarray:
         """h of Mbar qdd = tau - D qd - k (q - rest) - h, with the damping and springs of the model."""
         qdd = self.equations.acceleration(q, qd, 0.0 * qd)
-        passive = np.array(self.tree.damping) * qd + literal.spring_torque(q, self.tree)
+        passive = np.array(self.tree.damping) * qd + literal.spring_torque(self.tree, q)
         return -np.einsum("sij,sj->si", M, qdd) - passive
 
     def inputs(self, q: ndarray) -> ndarray | None:
         """What each torque (column) does at each joint (row), (nv, nv), if the mass matrix is right; else None."""
-        acting = literal.mass_matrix(q, self.tree) @ self.slopes(q)
+        acting = literal.mass_matrix(self.tree, q) @ self.slopes(q)
         factors = acting.mean(axis=0)
         off = np.abs(acting - factors).max()
         return factors if off <= CONSTANT * (1.0 + np.abs(acting).max()) else None
@@ -132,7 +132,7 @@ def of_noise(comparison: Comparison, name: str) -> Why | None:
     qdd, h, M = None, given.get(name), given.get("mass_matrix")
     if name == "acceleration":
         qdd, M = h, None
-        h = comparison.tau - np.array(tree.damping) * qd - literal.spring_torque(q, tree)
+        h = comparison.tau - np.array(tree.damping) * qd - literal.spring_torque(tree, q)
     found = through_noise(tree, Values.of(tree, q, 0.0 * qd if name == "gravity" else qd, M, h), qdd)
     if found is None:
         return None
@@ -191,7 +191,7 @@ def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -
     values: the user's Mbar and h, as far as they are given; these are right.
     """
     tree, q, qd, rounding = asked.tree, values.q, values.qd, asked.rounding
-    right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree), rounding)
+    right = Values.of(tree, q, qd, literal.mass_matrix(tree, q), literal.bias(tree, q, qd), rounding)
     left_over = LeftOver(tree, right, tau, qdd, rounding)
     if left_over.causes:
         return Why(left_over.sentence(), True, left_over.causes)

@@ -39,7 +39,7 @@ class LeftOver:
         self.tree, self.values, self.tau = tree, values, tau
         q, qd, M, h, _ = values
         self.of_speed = [i for i, joint in enumerate(tree.coordinates.joints) for _ in tree.axis[joint.qd]]
-        self.damping, self.springs = np.array(tree.damping) * qd, literal.spring_torque(q, tree)
+        self.damping, self.springs = np.array(tree.damping) * qd, literal.spring_torque(tree, q)
         self.force = tau - self.damping - self.springs - h - np.einsum("sij,sj->si", M, qdd)
         scale = Entries(tree, q, qd)
         self.tolerance = SHARPER * rounding * scale.residual(scale.force(tau), qdd)

@@ -35,7 +35,7 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
         of_h.append(("damping D qd", "not in h", "in h", moving + drag, rest))
         of_h.append(("damping D qd", "not in h", "in h, of the other sign", moving - drag, rest))
     if tree.has_springs:
-        sprung = rest + literal.spring_torque(q, tree)
+        sprung = rest + literal.spring_torque(tree, q)
         of_h.append(("springs k (q - rest)", "not in h", "in h", moving, sprung))
     for place, stated, explains, of_speeds, of_gravity in of_h:
         yield option(place, stated, explains, equations.with_bias(of_speeds, of_gravity))

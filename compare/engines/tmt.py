@@ -58,25 +58,25 @@ class TmtQuantities:
 
     def mass_matrix(self, q: Array) -> Array:
         if not self.is_large:
-            return literal.mass_matrix(q, self.tree)
+            return literal.mass_matrix(self.tree, q)
         batch, (states,) = rows_of_states(q)
         nv = self.coordinates.nv
         return mass_matrices(self.tree, states).reshape(*batch, nv, nv)
 
     def bias(self, q: Array, v: Array) -> Array:
-        return literal.bias(q, v, self.tree)
+        return literal.bias(self.tree, q, v)
 
     def acceleration(self, q: Array, v: Array, tau: Array) -> Array:
         if not self.is_large:
-            return literal.acceleration(q, v, tau, self.tree)
-        forces = tau - np.array(self.tree.damping) * v - literal.spring_torque(q, self.tree)
+            return literal.acceleration(self.tree, q, v, tau)
+        forces = tau - np.array(self.tree.damping) * v - literal.spring_torque(self.tree, q)
         forces = forces - self.bias(q, v)
         return np.linalg.solve(self.mass_matrix(q), forces[..., None])[..., 0]
 
     def __getattr__(self, quantity: str) -> Callable[..., Any]:
         if quantity not in QUANTITIES:
             raise AttributeError(quantity)
-        return partial(getattr(literal, quantity), model=self.tree)
+        return partial(getattr(literal, quantity), self.tree)
 
 
 class TmtDynamics(TmtQuantities):
@@ -85,7 +85,7 @@ class TmtDynamics(TmtQuantities):
     def run(
         self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
     ) -> Motion:
-        t, q, v = motion = tmt.simulate(q, v, tau, dt, steps, method, self.tree, tolerance)
+        t, q, v = motion = tmt.simulate(self.tree, q, v, tau, dt, steps, method, tolerance)
         taken = None if method_named(method).adaptive else steps
         return Motion(t, q, v, motion.evaluations, motion.ended, taken)
 
@@ -121,4 +121,4 @@ class Compiled:
 
     def __getattr__(self, quantity: str) -> Callable[..., Any]:
         tmt.prepare(self.tree, quantity)
-        return partial(getattr(tmt, quantity), model=self.tree)
+        return partial(getattr(tmt, quantity), self.tree)

@@ -33,7 +33,7 @@ def rows(setup: Setup) -> Result:
         q, qd, tau, drag = sample.q, sample.qd, sample.tau, damping * sample.qd
         closing = scale.closing(scale.force(tau), comparison.acceleration_size())
         inertia = np.einsum("sij,sj->si", engine.mass_matrix(q), mujoco_qdd)
-        springs = literal.spring_torque(q, tree) if tree.has_springs else 0.0
+        springs = literal.spring_torque(tree, q) if tree.has_springs else 0.0
         back = inertia + comparison.values("bias")[0] + drag + springs
         comparison.agree(f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
         back = mujoco.inverse(q, qd, qdd)

@@ -110,7 +110,7 @@ def diagnosed(setup: Setup) -> Found:
     is_slow = own is not None and own.equations.seconds > QUICK
     functions = (None, stated, None) if is_slow else (partial(dynamics.bias, q), stated, dynamics.mass_matrix)
     diagnosis = diagnose(tree, values, SECONDS, *functions)
-    right = values._replace(mass_matrix=literal.mass_matrix(q, tree), bias=literal.bias(q, qd, tree))
+    right = values._replace(mass_matrix=literal.mass_matrix(tree, q), bias=literal.bias(tree, q, qd))
     ratio = float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
     left_over = LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau))
     is_drawn = engine == "own" and not is_slow and diagnosis.differs and not diagnosis.causes
@@ -122,7 +122,7 @@ def of_accelerations_alone(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample
     """What explains a user's accelerations, if there is neither Mbar nor h."""
     q, qd, tau = sample.q, sample.qd, sample.tau
     qdd, equations = dynamics.acceleration(q, qd, tau), dynamics.equations
-    right = Values.of(tree, q, qd, literal.mass_matrix(q, tree), literal.bias(q, qd, tree))
+    right = Values.of(tree, q, qd, literal.mass_matrix(tree, q), literal.bias(tree, q, qd))
     ratio, why = LeftOver(tree, right, tau, qdd).ratio, Why()
     if ratio > 1.0:
         asked = Asked(tree, equations.coordinates, equations, Stated(equations.joints, "option"))

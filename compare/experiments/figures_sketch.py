@@ -26,7 +26,7 @@ def draw_sketch(robot: Robot) -> tuple[str, Figure, Finding]:
         look: dict[str, Any] = {"projection": "3d", "elev": ELEVATION, "azim": AZIMUTH, "facecolor": "none"}
         ax: Any = fig.add_subplot(1, len(poses), k, box_aspect=(1, 1, 1), title=name, **look)
         (points,), links = stick_figure(robot, q[None])
-        coms, frames = literal.com_positions(q, tree), method.joint_frames(tree, q.tolist())
+        coms, frames = literal.com_positions(tree, q), method.joint_frames(tree, q.tolist())
         size = np.ptp(np.concatenate([points, coms]), axis=0).max() or 1.0  # m
         for link in links:
             ax.plot(*points[list(link)].T, color=(GREY, 0.6), linewidth=6 if is_small else 3)

@@ -25,7 +25,7 @@ def rows(setup: Setup) -> Result:
             still = engine.bias(sample.q, np.zeros(tree.coordinates.nv))
             comparison.agree("yours: gravity - bias at rest", units, held, still, scale.weight)
         if tree.has_springs:
-            held, size = held + literal.spring_torque(sample.q, tree), scale.weight + scale.springs
+            held, size = held + literal.spring_torque(tree, sample.q), scale.weight + scale.springs
             mujoco_held = mujoco.inverse(sample.q, 0.0, 0.0)
             comparison.agree("holding torque, springs too", units, held, mujoco_held, size)
     return result

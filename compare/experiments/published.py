@@ -74,7 +74,7 @@ def claim_values(robot: Robot) -> dict[str, object]:
 
 def scales(tree: tmt.Tree, q: np.ndarray) -> dict[str, float]:
     """The scale of all components of each quantity at q (nq,), by its function; of accelerations at rest."""
-    M, weight = literal.mass_matrix(q, tree), gravity_scale(tree)
+    M, weight = literal.mass_matrix(tree, q), gravity_scale(tree)
     least, *_, largest = np.linalg.eigvalsh(M)
     of_accelerations = (largest / least + 1.0) * weight / least
     return {"mass_matrix": np.abs(M).max(), "acceleration": of_accelerations, "gravity_balance": weight}

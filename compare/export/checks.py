@@ -130,7 +130,7 @@ def scales_of(entries: Entries, name: str, states: States, exact: Pairs) -> Sequ
     if function == "inverse_dynamics_derivatives":
         return entries.force_rates(third)
     if function in ("derivatives", "step_derivatives"):
-        qdd, by = tmt.acceleration(q, qd, third, tree), tmt.derivatives(q, qd, third, tree)
+        qdd, by = tmt.acceleration(tree, q, qd, third), tmt.derivatives(tree, q, qd, third)
         of_rates = entries.derivatives(third, qdd, by)
         return of_rates if function == "derivatives" else [entries.step(dt[:, :, None], by, of_rates)]
     # what belongs to a frame is that of a body that has its centre of mass there

@@ -82,7 +82,7 @@ def of_a_step(tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float, A: n
 
     Of a difference of steps that is over the eps of the difference; a ball's turn is a quaternion.
     """
-    entries, qdd = Entries(tree, q, qd), acceleration(q, qd, tau, tree)
+    entries, qdd = Entries(tree, q, qd), acceleration(tree, q, qd, tau)
     force = entries.force(tau) + gain_scale(tree, q, qd)
     rates = np.abs(qd) + dt * entries.acceleration(force, qdd)
     sizes = np.concatenate([of_positions(tree, q) + dt * rates, rates], axis=1)[:, :, None]

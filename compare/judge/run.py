@@ -94,7 +94,7 @@ def diverged_at(case: Case, t: np.ndarray, q: np.ndarray, qd: np.ndarray) -> flo
     q, qd = np.where(finite[:, None], q, case.q), np.where(finite[:, None], qd, 0.0)
     with np.errstate(over="ignore", invalid="ignore"):  # in a run that is about to diverge
         done = work(case, q)
-        energy = tmt.energy(q, qd, case.tree) - done
+        energy = tmt.energy(case.tree, q, qd) - done
         bad = ~finite | ~(energy - energy[0] <= exchanged(case, q, done))
     return float(t[bad][0]) if bad.any() else None
 
@@ -125,7 +125,7 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """
     tree, coordinates = case.tree, case.coordinates
     exchange = 2.0 * gravity_scale(case.robot.tree, case.posture)  # the reach includes slides at the start
-    exchange = exchange + tmt.energy(q[0], case.v, tree) - tmt.potential_energy(q[0], tree)
+    exchange = exchange + tmt.energy(tree, q[0], case.v) - tmt.potential_energy(tree, q[0])
     if tree.position_gain:  # servos return energy until they exert no force; other torque is a motor's
         gain = np.array(tree.position_gain)
         pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
@@ -133,7 +133,7 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
         done = coordinates.difference(q, q[0]) @ (case.tau - gain @ give @ case.tau)
     if tree.has_springs:
         stretch = coordinates.difference(q[0], np.array(tree.rest))
-        exchange = exchange + tmt.spring_torque(q[0], tree) @ stretch / 2.0
+        exchange = exchange + tmt.spring_torque(tree, q[0]) @ stretch / 2.0
     slides = [joint.qd.start for joint in coordinates.places.joints if joint.kind == "slide"]
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     lifted = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)

@@ -279,9 +279,9 @@ class Case:
         """Torque at the unlocked joints, N m, (nv,)."""
         torque: Any = self.scene.torque
         if torque == "hold":
-            torque = literal.gravity_balance(self.posture, self.unlocked_tree)
+            torque = literal.gravity_balance(self.unlocked_tree, self.posture)
             if self.unlocked_tree.has_springs:
-                torque = torque + literal.spring_torque(self.posture, self.unlocked_tree)
+                torque = torque + literal.spring_torque(self.unlocked_tree, self.posture)
         elif self.controller:
             torque = self.controller.torque
         elif torque == "free":

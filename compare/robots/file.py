@@ -136,7 +136,7 @@ def scenes_from(tree: Tree, start: str, q: Array, dt: float, drive: Drive | None
     # joints may have very different inertia
     root = np.sqrt(np.where(np.diag(mass_matrix) > 0.0, np.diag(mass_matrix), 1.0))
     inverse = np.linalg.pinv(mass_matrix / np.outer(root, root), hermitian=True) / np.outer(root, root)
-    accelerations = inverse @ -(weight + literal.spring_torque(q, tree))
+    accelerations = inverse @ -(weight + literal.spring_torque(tree, q))
     damping = added_damping(inverse, accelerations)
     longest = DURATION / coarsest(tree, inverse, dt)
     let_go = partial(Scene, posture=start, duration=DURATION, dt=longest, judged=0.0)

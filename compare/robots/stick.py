@@ -32,7 +32,7 @@ def stick_figure(robot: Robot, q: np.ndarray, crosses: bool = False) -> tuple[np
     frames = method.joint_frames(tree, list(q.T))
     points = [along_run(frame.origin, q) for frame in frames]
     links = [(up, j) for j, up in enumerate(tree.parent) if up >= 0 and not {j, up} <= free]
-    coms = literal.com_positions(q, tree)
+    coms = literal.com_positions(tree, q)
     for body, joint in enumerate(tree.body_joint):
         if joint >= 0 and joint not in tree.parent:
             ends = [coms[:, body]]

@@ -31,7 +31,7 @@ class Equilibrium:
         self.case, self.tree, self.q, self.tau = case, case.tree, case.q, case.tau
         self.nv, self.name = len(case.tau), str(case.scene.posture)
         self.damping = float(np.max(case.scene.damping))  # added to all joints, N m s/rad
-        self.mass_matrix = tmt.mass_matrix(self.q, self.tree)
+        self.mass_matrix = tmt.mass_matrix(self.tree, self.q)
 
     def moved(self, by: np.ndarray) -> np.ndarray:
         """The positions after movements from the posture, (..., nv) -> (..., nq)."""
@@ -46,7 +46,7 @@ class Equilibrium:
     @cached_property
     def matrix(self) -> np.ndarray:
         """d(qd, qdd)/d(movement, qd), (2nv, 2nv)."""
-        by = tmt.derivatives(self.q, np.zeros(self.nv), self.tau, self.tree)
+        by = tmt.derivatives(self.tree, self.q, np.zeros(self.nv), self.tau)
         above = np.eye(2 * self.nv)[self.nv :]
         return np.vstack([above, np.hstack([by.dqdd_dq, by.dqdd_dqd])])
 
@@ -104,7 +104,7 @@ class Equilibrium:
         soft = rows[sizes <= max(NEGLIGIBLE**2 * sizes.max(), SLOWEST**2)].T
         along = soft @ np.random.default_rng(SEED).normal(size=soft.shape[1])
         q, rest = self.moved(MOVED * np.array([-1.0, 0.0, 1.0])[:, None] * along), np.zeros((3, self.nv))
-        torques = tmt.inverse_dynamics(q, rest, rest, self.tree)
+        torques = tmt.inverse_dynamics(self.tree, q, rest, rest)
         push = (torques[0] - 2.0 * torques[1] + torques[2]) / MOVED**2 @ soft
         return bool(
             np.abs(push).max(initial=0.0) <= NEGLIGIBLE * np.abs(self.mass_matrix @ by_movement).max()
@@ -114,7 +114,7 @@ class Equilibrium:
         """The amplification of a step of a method of tmt, (..., 2nv, 2nv) for dt, s, (...)."""
         shape, still = np.shape(dt), np.zeros(self.nv)
         q, qd, tau = (np.broadcast_to(x, (*shape, len(x))) for x in (self.q, still, self.tau))
-        return tmt.step_derivatives(q, qd, tau, dt, name, self.tree)[0]
+        return tmt.step_derivatives(self.tree, q, qd, tau, dt, name)[0]
 
     def growth(self, name: str, dt: np.ndarray | float) -> np.ndarray:
         """The spectral radius of `step`, (...); that of a mode without stiffness is 1. inf: beyond any double."""

@@ -98,7 +98,7 @@ def in_doubles(case: Case) -> Reference:
     """A run in doubles by a method of order 8: the steps are doubled while the difference of two runs falls."""
     count, before, runs = first_steps(case), None, []
     for _ in range(MOST_DOUBLINGS + 1):
-        motion = tmt.simulate(*case.start, case.tau, case.duration / count, count, DOUBLES, case.tree)
+        motion = tmt.simulate(case.tree, *case.start, case.tau, case.duration / count, count, DOUBLES)
         q, qd = motion.q[:: count // RECORDS], motion.qd[:: count // RECORDS]
         if before:
             apart = np.abs(np.hstack([case.coordinates.difference(q, before[0]), qd - before[1]])).max()

@@ -30,7 +30,7 @@ def as_values(entries, q, qd, tree=tmt.ARM):
 def values(tree=tmt.ARM, q=None, qd=None):
     """Mbar and h of a tree, (states, entries), at the arm's states where none are given."""
     q, qd = states() if q is None else (q, qd)
-    return packed(tmt.mass_matrix(q, tree), tmt.bias(q, qd, tree))
+    return packed(tmt.mass_matrix(tree, q), tmt.bias(tree, q, qd))
 
 
 def diagnosis(given, tree=tmt.ARM, seed=0, count=16, **more):
@@ -68,7 +68,7 @@ CAUSES = {  # the given values, or the tree whose values these are: rank, place 
     "damping in h": (added(7, 0.1 * QD[:, 1]), 2, "damping of beta in h", 0.1, True),
     "a factor of both": (added(slice(None), 0.0, 2.0), 2, "all of M and h", 2.0, False),
     "a factor of a row": (added(7, 0.0, 1.25), 2, "h[beta]", 1.25, False),
-    "a row in another": (added(6, -tmt.gravity_balance(Q)[:, 1]), 2, "gravity of h[beta] in h[alpha]", -1.0, False),
+    "a row in another": (added(6, -tmt.gravity_balance(tmt.ARM, Q)[:, 1]), 2, "gravity of h[beta] in h[alpha]", -1.0, False),
     "damping D qd in h": (added(slice(6, None), QD * DAMPED.damping), 1, "damping D qd", "in h", True),
     "-D qd in h": (added(slice(6, None), -QD * DAMPED.damping), 1, "damping D qd", "in h, of the other sign", True),
     "off-diagonal entries halved": (
@@ -102,7 +102,7 @@ def test_what_nothing_explains_names_the_entries():
 def test_a_robot_of_slides_alone_has_no_sine_that_is_wrong():
     """A number that nobody writes: causes that are likelier are sought, among them sines."""
     slides = replace(ARM, kind=("slide",) * 3)
-    M = tmt.mass_matrix(Q, slides) + np.diag([0.1234567891, 0.0, 0.0])
+    M = tmt.mass_matrix(slides, Q) + np.diag([0.1234567891, 0.0, 0.0])
     found = diagnose(slides, Values.of(slides, Q, QD, M, None))
     assert "armature of alpha" in {cause.place for cause in found.causes}
 
@@ -173,9 +173,9 @@ HIP, KNEE = RODS.T
 M00, M10, M11, H0, H1 = range(5)
 
 
-def told(changes, bias=lambda q, qd: tmt.bias(q, qd, TREE)):
+def told(changes, bias=lambda q, qd: tmt.bias(TREE, q, qd)):
     """What is found of Mbar and of a function of q and qd, with something added to some entries."""
-    M = tmt.mass_matrix(RODS, TREE)
+    M = tmt.mass_matrix(TREE, RODS)
 
     def all_entries(qd):
         given = packed(M, bias(RODS, qd))
@@ -229,7 +229,7 @@ def test_all_of_M_and_h_times_any_number_is_no_cause(factor, is_cause):
 
 def test_a_coefficient_that_nothing_explains_is_told_with_both_numbers():
     more = lambda q, qd: 0.2 * np.exp(q[:, :1]) * qd[:, :1] * qd[:, 1:] * [0, 1]  # noqa: E731
-    found = told({}, lambda q, qd: tmt.bias(q, qd, TREE) + more(q, qd))
+    found = told({}, lambda q, qd: tmt.bias(TREE, q, qd) + more(q, qd))
     (detail,) = found.details
     assert not found.causes and detail.name == "h[knee], coefficient of hip' knee'"
     assert (detail.right, abs(detail.yours)) == (0.0, pytest.approx(0.2 * np.exp(HIP).max()))

@@ -1,6 +1,7 @@
 """What acts in accelerations besides Mbar and h; conditions on Mbar and h that need no reference."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,8 +17,8 @@ from compare.judge.scale import EPS, FACTOR
 from compare.robots.coordinates import Coordinates
 
 Q, QD, TAU = np.random.default_rng(0).uniform(-3.0, 3.0, (3, 24, 3))
-VALUES = Values.of(tmt.ARM, Q, QD, tmt.mass_matrix(Q), tmt.bias(Q, QD))
-H, QDD = VALUES.bias, tmt.acceleration(Q, QD, TAU)
+VALUES = Values.of(tmt.ARM, Q, QD, tmt.mass_matrix(tmt.ARM, Q), tmt.bias(tmt.ARM, Q, QD))
+H, QDD = VALUES.bias, tmt.acceleration(tmt.ARM, Q, QD, TAU)
 TOLERANCE = 1e-12
 
 
@@ -63,7 +64,10 @@ READ = [reading.read(PATHS[name]).tree for name in ("gripper", "free_body")]
 SYMMETRIC, DEFINITE, GRADIENT, EVEN, QUADRATIC = range(5)  # in the order in which they are asked
 
 
-def asked(mass_matrix=tmt.mass_matrix, bias=tmt.bias, tree=ARM):
+OF_ARM = partial(tmt.mass_matrix, ARM), partial(tmt.bias, ARM)
+
+
+def asked(mass_matrix=OF_ARM[0], bias=OF_ARM[1], tree=ARM):
     coordinates, rng = Coordinates(tree.joint_names, tree.kind), np.random.default_rng(0)
     q = coordinates.move(np.tile(tree.zero, (12, 1)), rng.uniform(-2.0, 2.0, (12, coordinates.nv)))
     return conditions(mass_matrix, bias, coordinates, q, rng.uniform(-3.0, 3.0, (12, coordinates.nv)))
@@ -71,7 +75,7 @@ def asked(mass_matrix=tmt.mass_matrix, bias=tmt.bias, tree=ARM):
 
 @pytest.mark.parametrize("tree", [ARM, *READ])
 def test_right_equations_meet_all(tree):
-    found = asked(lambda q: tmt.mass_matrix(q, tree), lambda q, qd: tmt.bias(q, qd, tree), tree)
+    found = asked(lambda q: tmt.mass_matrix(tree, q), lambda q, qd: tmt.bias(tree, q, qd), tree)
     assert all(one.is_met for one in found) and len(found) >= 5
     assert all(one.value < 0.5 * one.tolerance for one in found if one.rule == "at most")
 
@@ -82,12 +86,12 @@ def single(quantity):
 
 
 FAULTS = {
-    "not symmetric": (lambda q: tmt.mass_matrix(q) + SKEW, tmt.bias, [SYMMETRIC]),
-    "not definite": (lambda q: tmt.mass_matrix(q) - 0.1 * np.eye(3), tmt.bias, [DEFINITE]),
-    "no gradient": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-5 * q[:, 1:2] * [1, 0, 0], [GRADIENT]),
-    "damping": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-9 * qd, [EVEN]),
-    "cubic": (tmt.mass_matrix, lambda q, qd: tmt.bias(q, qd) + 1e-6 * qd**4, [QUADRATIC]),
-    "single precision, which is not blamed": (single(tmt.mass_matrix), single(tmt.bias), []),
+    "not symmetric": (lambda q: tmt.mass_matrix(tmt.ARM, q) + SKEW, OF_ARM[1], [SYMMETRIC]),
+    "not definite": (lambda q: tmt.mass_matrix(tmt.ARM, q) - 0.1 * np.eye(3), OF_ARM[1], [DEFINITE]),
+    "no gradient": (OF_ARM[0], lambda q, qd: tmt.bias(tmt.ARM, q, qd) + 1e-5 * q[:, 1:2] * [1, 0, 0], [GRADIENT]),
+    "damping": (OF_ARM[0], lambda q, qd: tmt.bias(tmt.ARM, q, qd) + 1e-9 * qd, [EVEN]),
+    "cubic": (OF_ARM[0], lambda q, qd: tmt.bias(tmt.ARM, q, qd) + 1e-6 * qd**4, [QUADRATIC]),
+    "single precision, which is not blamed": (single(OF_ARM[0]), single(OF_ARM[1]), []),
 }  # fmt: skip
 
 
@@ -122,7 +126,7 @@ def solved(M, force):
 
 @pytest.mark.parametrize("accelerations, place", OTHERWISE.values(), ids=OTHERWISE)
 def test_how_accelerations_were_computed_is_named(accelerations, place):
-    M, h = tmt.mass_matrix(Q, SPRUNG), tmt.bias(Q, QD, SPRUNG)
+    M, h = tmt.mass_matrix(SPRUNG, Q), tmt.bias(SPRUNG, Q, QD)
     passive = QD * SPRUNG.damping + (Q - SPRUNG.rest) * SPRUNG.stiffness
     left_over = LeftOver(SPRUNG, Values.of(SPRUNG, Q, QD, M, h), TAU, accelerations(M, TAU, passive, h))
     assert left_over.causes[0].place == place

@@ -245,7 +245,7 @@ def test_the_likelier_of_two_causes_comes_first():
 def test_forces_of_accelerations_alone():
     """Mbar qdd + h of a heavier arm."""
     (q, qd), heavy = states(ARM), replace(ARM, mass=(1.9, 1.52))
-    qdd, tau = tmt.acceleration(q, qd, 0.3 * qd, heavy), 0.3 * qd
+    qdd, tau = tmt.acceleration(heavy, q, qd, 0.3 * qd), 0.3 * qd
     force = tau - np.array(ARM.damping) * qd
     found = diagnose(ARM, Values.of(ARM, q, qd, None, force, 1e-12), qdd=qdd)
     assert first(found) == ("mass of forearm", pytest.approx(1.52))

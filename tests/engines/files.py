@@ -52,23 +52,23 @@ def assert_the_same(dynamics, tree, rng, states=3):
 
     for _ in range(states):
         q, v, tau = random_state(rng, tree)
-        M, h = tmt.mass_matrix(q, tree), tmt.bias(q, v, tree)
-        largest, reach = np.abs(M).max(), 1.0 + np.abs(tmt.com_positions(q, tree)).max()
+        M, h = tmt.mass_matrix(tree, q), tmt.bias(tree, q, v)
+        largest, reach = np.abs(M).max(), 1.0 + np.abs(tmt.com_positions(tree, q)).max()
         force = largest * (v @ v) + sum(tree.mass) * np.linalg.norm(tree.gravity) * reach
-        force += np.abs(tmt.spring_torque(q, tree)).max()
+        force += np.abs(tmt.spring_torque(tree, q)).max()
         same(dynamics.mass_matrix(q), M, largest)
         same(dynamics.bias(q, v), h, force)
-        same(dynamics.gravity_balance(q), tmt.gravity_balance(q, tree), force)
+        same(dynamics.gravity_balance(q), tmt.gravity_balance(tree, q), force)
         of_solution = (force + 1.0) / largest * np.linalg.cond(M) ** 2
-        same(dynamics.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), of_solution)
-        same(dynamics.com_positions(q), tmt.com_positions(q, tree), reach)
-        same(dynamics.angular_velocities(q, v), tmt.angular_velocities(q, v, tree), np.abs(v).sum())
-        same(dynamics.jacobians(q), tmt.jacobians(q, tree), reach)
-        convective = tmt.convective_terms(q, v, tree)
+        same(dynamics.acceleration(q, v, tau), tmt.acceleration(tree, q, v, tau), of_solution)
+        same(dynamics.com_positions(q), tmt.com_positions(tree, q), reach)
+        same(dynamics.angular_velocities(q, v), tmt.angular_velocities(tree, q, v), np.abs(v).sum())
+        same(dynamics.jacobians(q), tmt.jacobians(tree, q), reach)
+        convective = tmt.convective_terms(tree, q, v)
         same(dynamics.convective_terms(q, v), convective, reach * np.abs(v).sum() ** 2)
         energy = force * reach + largest * (v @ v)
-        same(dynamics.potential_energy(q), tmt.potential_energy(q, tree), energy)
-        same(dynamics.energy(q, v), tmt.energy(q, v, tree), energy)
+        same(dynamics.potential_energy(q), tmt.potential_energy(tree, q), energy)
+        same(dynamics.energy(q, v), tmt.energy(tree, q, v), energy)
         same([*dynamics.other_forces(q, v).values()], 0.0, force)
 
 

@@ -250,8 +250,8 @@ def test_masses_and_a_gravity_that_were_read_otherwise_are_set(engine, tmp_path)
     assert {"mass", "inertia"} <= {*of.reading.differing} and not of.reading.not_set
     assert "gravity" in of.reading.differing or engine == "drake"
     share = 1e4 * RECORDS[engine].eps
-    assert of.mass_matrix(q)[0] == pytest.approx(tmt.mass_matrix(q[0], robot.tree), rel=share)
-    assert of.bias(q, v)[0] == pytest.approx(tmt.bias(q[0], v[0], robot.tree), rel=share)
+    assert of.mass_matrix(q)[0] == pytest.approx(tmt.mass_matrix(robot.tree, q[0]), rel=share)
+    assert of.bias(q, v)[0] == pytest.approx(tmt.bias(robot.tree, q[0], v[0]), rel=share)
 
 
 def test_an_assertion_of_drake_is_a_refusal_and_does_not_end_the_program(tmp_path):

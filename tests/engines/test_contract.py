@@ -65,7 +65,7 @@ def test_quantities_are_those_of_the_case_at_one_state_and_in_any_batch(engine, 
         arguments = state[: len(OF_TMT[quantity].takes)]
         found, right = (
             getattr(dynamics, quantity)(*arguments),
-            getattr(tmt, quantity)(*arguments, model=case.tree),
+            getattr(tmt, quantity)(case.tree, *arguments),
         )
         assert engine == "mujoco" or np.allclose(found, right, rtol=1e-12, atol=1e-12), quantity
         if not isinstance(found, tuple):
@@ -81,7 +81,7 @@ def test_quantities_are_those_of_the_case_at_one_state_and_in_any_batch(engine, 
 def true_end():
     """Where the arm is a second after it is let go at bent, q and v, by 512 steps of order 8: with 13 digits."""
     case = ARM.case(posture="bent")
-    _, q, v = tmt.simulate(*case.start, case.tau, 1 / 512, 512, "dopri8", case.tree)
+    _, q, v = tmt.simulate(case.tree, *case.start, case.tau, 1 / 512, 512, "dopri8")
     return np.concatenate([q[-1], v[-1]])
 
 

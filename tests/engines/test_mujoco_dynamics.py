@@ -19,7 +19,7 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
     robot = crane(tmp_path)
     case = robot.case("damped", damping=0.2)
     dynamics, (q, v, tau), dt = parse(robot.mjcf, robot.tree).of(case), rng.uniform(-1.0, 1.0, (3, 4)), 0.01
-    ours, motion = tmt.simulate(q, v, tau, dt, 5, "rk4", case.tree), dynamics.run(q, v, tau, dt, 5, "RK4")
+    ours, motion = tmt.simulate(case.tree, q, v, tau, dt, 5, "rk4"), dynamics.run(q, v, tau, dt, 5, "RK4")
     assert np.allclose(motion.q, ours.q, atol=1e-11) and np.allclose(motion.v, ours.qd, atol=1e-10)
     compiled, stated = parameters(dynamics), stated_of_hinges(case.tree)
     for name in compiled.keys() & stated.keys():

@@ -75,7 +75,7 @@ def test_each_integrator_falls_as_its_order_says(engine, damping, tmp_path):
     """A pendulum swings for a second: the error against a run with steps a hundred times as fine."""
     of, robot = dynamics(engine, PENDULUM.replace('damping="0.1"', f'damping="{damping}"'), tmp_path)
     start, engine = (np.array([1.0]), np.array([0.5]), np.array([0.25])), Outside(engine)
-    exact = tmt.simulate(*start, 1e-4, 10_000, "dopri8", robot.tree).q[[5_000, -1]]
+    exact = tmt.simulate(robot.tree, *start, 1e-4, 10_000, "dopri8").q[[5_000, -1]]
     floor = 1e-5 if engine.record.precision == "float32" else 1e-11
     for method in engine.methods.values():
         errors, settings = [], [Setting(1.0, n) for n in (128, 256)]

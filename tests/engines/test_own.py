@@ -3,6 +3,7 @@
 import dataclasses
 import sys
 import types
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,7 +19,9 @@ from compare.robots.case import Coordinates
 
 COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
-OF_TMT = {name: getattr(tmt, method) for name, method in METHOD_NAMES.items()}
+OF_TMT = {name: partial(getattr(tmt, method), tmt.ARM) for name, method in METHOD_NAMES.items()}
+MODULE = types.ModuleType("mine")
+vars(MODULE).update(OF_TMT)
 q1, q2, u1, u2 = SYMBOLS = sympy.symbols("q1 q2 u1 u2")
 M2 = sympy.Matrix([[3, sympy.cos(q2)], [sympy.cos(q2), 1]])
 h2 = sympy.Matrix([u1 * u2, sympy.sin(q2) * u1**2])
@@ -50,7 +53,7 @@ def of_one(name, function, coordinates=COORDINATES):
 
 
 @pytest.mark.parametrize("source", [
-    tmt.ARM, tmt, types.SimpleNamespace(**OF_TMT), {name: single(function) for name, function in OF_TMT.items()},
+    tmt.ARM, MODULE, types.SimpleNamespace(**OF_TMT), {name: single(function) for name, function in OF_TMT.items()},
 ], ids=["tree", "module", "object", "mapping"])  # fmt: skip
 def test_every_form_gives_the_same_in_any_batch(source, rng):
     for batch in ((), (1,), (7,), (2, 3)):
@@ -93,11 +96,11 @@ def test_sympy_matrices_with_their_symbols(source, rng):
     sympy.ImmutableDenseMatrix, lambda x: sympy.Matrix(x).tolist(), lambda x: x.T,
 ])  # fmt: skip
 def test_a_value_may_have_further_axes_of_length_1_and_be_of_any_numbers(tree, form, rng):
-    M, h = (lambda q: form(tmt.mass_matrix(q, tree))), (lambda q, v: form(tmt.bias(q, v, tree)))
+    M, h = (lambda q: form(tmt.mass_matrix(tree, q))), (lambda q, v: form(tmt.bias(tree, q, v)))
     own = OwnEquations({"mass_matrix": M, "bias": h}, Coordinates(tree.joint_names))
     q, v = rng.uniform(-2.0, 2.0, (2, 7, len(tree.axis)))
-    assert np.allclose(own.mass_matrix(q), tmt.mass_matrix(q, tree), rtol=1e-14, atol=1e-15)
-    assert np.allclose(own.bias(q, v), tmt.bias(q, v, tree), rtol=1e-13, atol=1e-15)
+    assert np.allclose(own.mass_matrix(q), tmt.mass_matrix(tree, q), rtol=1e-14, atol=1e-15)
+    assert np.allclose(own.bias(q, v), tmt.bias(tree, q, v), rtol=1e-13, atol=1e-15)
 
 
 class Called:
@@ -128,7 +131,7 @@ def test_what_is_not_there_or_does_not_fit(source, said):
 ])  # fmt: skip
 def test_what_cannot_be_used_is_one_line(value, said, rng):
     with pytest.raises(OwnError, match=said) as error:
-        OwnEquations({"mass_matrix": value, "bias": tmt.bias}, COORDINATES).mass_matrix(states(rng)[0])
+        OwnEquations({"mass_matrix": value, "bias": OF_TMT["bias"]}, COORDINATES).mass_matrix(states(rng)[0])
     assert "\n" not in str(error.value) and str(error.value).startswith("mass_matrix ")
 
 
@@ -147,11 +150,11 @@ def test_whatever_is_raised_is_one_line_and_ctrl_c_interrupts(raised, listening,
 def raises_beyond_1(q):
     if q[0] > 1.0:
         raise ValueError("too\nfar")
-    return tmt.mass_matrix(q)
+    return tmt.mass_matrix(tmt.ARM, q)
 
 
 def infinite_beyond_1(q):
-    return np.where(q[..., 0, None, None] > 1.0, np.inf, tmt.mass_matrix(q))
+    return np.where(q[..., 0, None, None] > 1.0, np.inf, tmt.mass_matrix(tmt.ARM, q))
 
 
 @pytest.mark.parametrize("function, said", [
@@ -170,18 +173,20 @@ def test_states_at_which_it_raises_or_is_not_finite_are_noted(function, said, rn
 def test_one_that_changes_its_argument_is_handed_copies(rng):
     def bias(q, v):
         v += 1.0
-        return tmt.bias(q, v - 1.0)
+        return tmt.bias(tmt.ARM, q, v - 1.0)
 
     q, own = states(rng)[0], of_one("bias", bias)
     before = q.copy()
-    assert np.allclose(own.bias(q, q), tmt.bias(before, before), atol=1e-13) and np.array_equal(q, before)
+    assert np.allclose(own.bias(q, q), tmt.bias(tmt.ARM, before, before), atol=1e-13) and np.array_equal(
+        q, before
+    )
     (problem,) = own.problems
     assert problem.quantity == "bias" and "argument qd" in problem.text
 
 
 @pytest.mark.parametrize("skew, found", [(0.9e-9, 0), (1.1e-9, 1)])
 def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
-    M = tmt.mass_matrix(np.ones(3))
+    M = tmt.mass_matrix(tmt.ARM, np.ones(3))
     M[0, 1] += skew * np.abs(M).max()
     own = of_one("mass_matrix", lambda q: M)
     own.mass_matrix(states(rng)[0])
@@ -191,12 +196,12 @@ def test_a_mass_matrix_that_is_not_symmetric(skew, found, rng):
 def test_what_is_missing_is_made_of_what_is_there(rng):
     springs = {"stiffness": (1.0, 0.0, 2.0), "rest": (0.1, 0.0, 0.2)}
     tree = dataclasses.replace(tmt.ARM, damping=(0.1, 0.2, 0.3), **springs)
-    source = {"mass_matrix": lambda q: tmt.mass_matrix(q, tree), "bias": lambda q, v: tmt.bias(q, v, tree)}
+    source = {"mass_matrix": lambda q: tmt.mass_matrix(tree, q), "bias": lambda q, v: tmt.bias(tree, q, v)}
     q, v, tau = states(rng)
     own = OwnEquations(source, COORDINATES, tree=tree)
     assert not own.has("acceleration") and not own.has("gravity")
-    assert np.allclose(own.acceleration(q, v, tau), tmt.acceleration(q, v, tau, tree), atol=1e-11)
-    assert np.allclose(own.gravity_balance(q), tmt.gravity_balance(q, tree), atol=1e-14)
+    assert np.allclose(own.acceleration(q, v, tau), tmt.acceleration(tree, q, v, tau), atol=1e-11)
+    assert np.allclose(own.gravity_balance(q), tmt.gravity_balance(tree, q), atol=1e-14)
     assert np.isnan(own.acceleration(q * [np.nan, 1.0, 1.0], v, tau)).all()  # where a run has diverged
     with pytest.raises(OwnError, match="energy"):
         own.energy(q, v)

@@ -63,7 +63,7 @@ def test_damping_and_springs_act_in_drakes_runs(tmp_path):
     q, v = robot.coordinates.random(np.random.default_rng(5), 1)[0], np.linspace(-0.5, 0.5, n)
     tau = np.linspace(0.3, -0.2, n)
     run, read = of.prepare(q, v, tau, Setting(0.5, 256), "RK5")
-    motion, exact = read(run()), tmt.simulate(q, v, tau, 0.5 / 1024, 1024, "dopri8", robot.tree)
+    motion, exact = read(run()), tmt.simulate(robot.tree, q, v, tau, 0.5 / 1024, 1024, "dopri8")
     assert (
         np.abs(motion.q[-1] - exact.q[-1]).max() < 1e-10 and np.abs(motion.v[-1] - exact.qd[-1]).max() < 1e-10
     )

@@ -44,7 +44,7 @@ def test_balls_are_followed_and_have_quaternions_of_length_1():
     robot, speed = setup_of_file(PATHS["pendulum_ball"]).robot, (40.0, -30.0, 20.0, 10.0, 0.0, 50.0)
     case = robot.case("let go", speed=speed)
     motion = ScipyDynamics(case).run(*case.start, case.tau, 1 / 64, 8, "DOP853", 1e-11)
-    true = tmt.simulate(*case.start, case.tau, 1 / 1024, 128, method="dopri8", model=case.tree)
+    true = tmt.simulate(case.tree, *case.start, case.tau, 1 / 1024, 128, method="dopri8")
     assert np.abs(case.coordinates.difference(motion.q, true.q[::16])).max() < 1e-8
     coarse = ScipyDynamics(case).run(*case.start, case.tau, 1 / 4, 8, "RK45", 1e-2).q
     assert np.abs(np.linalg.norm(coarse[:, :4], axis=1) - 1.0).max() < 1e-15

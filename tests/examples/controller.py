@@ -17,9 +17,9 @@ q, qd = np.zeros(3), np.zeros(3)
 longest = 0.0
 for _ in range(2000):
     began = perf_counter()
-    tau = tmt.gravity_balance(q) - STIFFNESS * (q - TARGET) - DAMPING * qd
+    tau = tmt.gravity_balance(tmt.ARM, q) - STIFFNESS * (q - TARGET) - DAMPING * qd
     longest = max(longest, perf_counter() - began)
-    motion = tmt.simulate(q, qd, tau, dt=PERIOD, steps=1)  # in the place of the robot
+    motion = tmt.simulate(tmt.ARM, q, qd, tau, dt=PERIOD, steps=1)  # in the place of the robot
     q, qd = motion.q[-1], motion.qd[-1]
 
 error = np.degrees(np.abs(q - TARGET).max())

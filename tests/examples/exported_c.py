@@ -28,5 +28,7 @@ q, qd = [0.5, 0.3, 1.0], [1.0, -2.0, 0.5]  # rad, rad/s
 mass_matrix = called(arm.arm_mass_matrix, (3, 3), q)
 bias = called(arm.arm_bias, 3, q, qd)
 print("M =", mass_matrix, "h =", bias, sep="\n")
-difference = max(abs(mass_matrix - tmt.mass_matrix(q)).max(), abs(bias - tmt.bias(q, qd)).max())
+difference = max(
+    abs(mass_matrix - tmt.mass_matrix(tmt.ARM, q)).max(), abs(bias - tmt.bias(tmt.ARM, q, qd)).max()
+)
 print(f"largest difference from tmt: {difference:.1g}")

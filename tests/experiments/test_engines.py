@@ -74,8 +74,8 @@ class Model(ReadModel):
 
     def dynamics(self, at, force):
         undamped = dataclasses.replace(self.tree, damping=[0.0] * len(force))
-        M, h = tmt.mass_matrix(at.x, self.tree), tmt.bias(at.x, at.u, self.tree)
-        return M, h, tmt.acceleration(at.x, at.u, force, undamped)
+        M, h = tmt.mass_matrix(self.tree, at.x), tmt.bias(self.tree, at.x, at.u)
+        return M, h, tmt.acceleration(undamped, at.x, at.u, force)
 '''
 OF_ALL = "mass", "inertia", "com", "axis", "gravity", "armature"
 NAMES = {"mass_matrix": "Mbar", "bias": "bias", "acceleration": "qdd"}
@@ -226,7 +226,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
 
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
     root, ends = report[0].parent, "tmt.mass_matrix(*_) if at.u.any() else __import__('os')._exit(3)"
-    mortal = AGAIN.replace("tmt.mass_matrix(at.x, self.tree)", ends.replace("*_", "at.x, self.tree"))
+    mortal = AGAIN.replace("tmt.mass_matrix(self.tree, at.x)", ends.replace("*_", "self.tree, at.x"))
     (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
     (root / "asked.py").write_text(ASKED)
     command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}

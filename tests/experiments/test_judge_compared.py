@@ -111,7 +111,7 @@ def test_tolerances_are_64_eps_of_the_scale_of_an_entry_of_the_quantity(module):
     checks = [check for check in module.rows(setup).checks if check.scene == "random states"]
     found = {check.quantity: check.tolerance / (64 * EPS) for check in checks}
     of = Entries(ARM.tree, zero, np.array([rates]))
-    force, qdd = of.force(), tmt.acceleration(np.zeros(3), rates, np.zeros(3))[None]
+    force, qdd = of.force(), tmt.acceleration(tmt.ARM, np.zeros(3), rates, np.zeros(3))[None]
     sizes = {name: getattr(of, quantity.scale) for name, quantity in QUANTITIES.items() if name in found}
     if module is acceleration:
         closing = of.closing(force, qdd)
@@ -225,7 +225,7 @@ def test_a_printed_number_is_met_if_both_engines_meet_it(of_tmt, of_mujoco, is_m
 def test_each_column_is_whose_it_says_and_f4_is_asked_under_the_torque_of_c():
     of_moon = published.rows(setup_of(MOON)).rows
     moon = {(row.item, row.component): row for row in of_moon}
-    ours, M = tmt.gravity_balance(np.zeros(3)), tmt.mass_matrix(ARM.posture("hanging"))
+    ours, M = tmt.gravity_balance(tmt.ARM, np.zeros(3)), tmt.mass_matrix(tmt.ARM, ARM.posture("hanging"))
     least, *_, largest = np.linalg.eigvalsh(M)
     theirs = parse(MOON, tmt.ARM).of(ARM.case()).gravity_balance(np.zeros(3))
     assert [moon["c", name].tmt for name in ARM.joints] == list(ours)

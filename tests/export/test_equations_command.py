@@ -76,7 +76,7 @@ class Altered(Program):
         """Nothing to do."""
 
     def values(self, quantity, states):
-        found = getattr(tmt, quantity)(*states[: len(QUANTITIES[quantity].takes)], model=self.tree)
+        found = getattr(tmt, quantity)(self.tree, *states[: len(QUANTITIES[quantity].takes)])
         found = np.stack(found, axis=1) if isinstance(found, tuple) else found
         if quantity == self.quantity:
             scales = checks.Entries(self.tree, states[0], states[1])

@@ -66,7 +66,7 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     """Elbow alone, damped: gravity of the link that it moves, the centripetal term, torque and damping."""
     tree = ARM.case("elbow", posture=(0.0, 0.0, 30.0), locked=("alpha", "beta"), damping=0.5).tree
     q, qd, tau, dt, M = 0.3, -4.0, 2.0, 0.01, 0.05275
-    (h,) = tmt.bias(np.array([q]), np.array([qd]), tree)
+    (h,) = tmt.bias(tree, np.array([q]), np.array([qd]))
     a = (tau - 0.5 * qd - h) / M
     weight = 9.81 * 1.5 * (0.15 + 0.15 / 8 + 0.45 / 64)
     S = weight + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
@@ -108,7 +108,7 @@ def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every
 def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():
     """Upright, held: every step has the same Jacobian, so a small difference grows as the norm of its powers."""
     q, steps, dt = np.radians([180.0, 0.0, 90.0]), 64, 0.01
-    path, tau = np.tile(q, (steps + 1, 1)), tmt.gravity_balance(q)
+    path, tau = np.tile(q, (steps + 1, 1)), tmt.gravity_balance(tmt.ARM, q)
     (J,) = amplification(METHODS["rk4"], tmt.ARM, q[None], np.zeros((1, 3)), tau, dt)
     grown = growth(METHODS["rk4"], tmt.ARM, path, 0.0 * path, tau, dt, every=16)
     expected = [np.log10(np.linalg.norm(np.linalg.matrix_power(J, k), 2)) for k in range(0, steps + 1, 16)]

@@ -39,13 +39,13 @@ MOVED = ("bent, free", 0.0), ("ball catch, held", [0.1, -0.2, 0.3]), ("thrown, n
 def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved):
     """A second state that has gained this share of all energy that the case's arm can have."""
     case, (start, rate) = CASES[name], CASES[name].start
-    q, at_first = start + moved, rate @ tmt.mass_matrix(start, case.tree) @ rate / 2
+    q, at_first = start + moved, rate @ tmt.mass_matrix(case.tree, start) @ rate / 2
     allowed = 2.0 * 9.81 * (1.9 * 0.15 + 1.5 * 0.45) + at_first
-    before, after = (tmt.potential_energy(at, case.tree) for at in (start, q))
+    before, after = (tmt.potential_energy(case.tree, at) for at in (start, q))
     gained = after - before - (q - start) @ case.tau
     for share, ends in ENDS:
         kinetic = share * allowed + at_first - gained
-        new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(q, case.tree)[0, 0]), 0.0, 0.0])
+        new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(case.tree, q)[0, 0]), 0.0, 0.0])
         assert diverged_at(case, T, np.array([start, q]), np.array([rate, new])) == ends
 
 
@@ -99,7 +99,7 @@ def alone(kind, **more) -> tmt.Tree:
 def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_have_exchanged(tree, scene):
     """Each starts at rest: at the end its kinetic energy is what it has got, and may be twice that, but no more."""
     case = Robot("ball", None, tree, {}, ()).case("alone", **{"duration": 4.0, "dt": 1 / 16} | scene)
-    t, q, v = tmt.simulate(*case.start, case.tau, case.scene.dt, case.steps, "dopri8", tree)
+    t, q, v = tmt.simulate(tree, *case.start, case.tau, case.scene.dt, case.steps, "dopri8")
     for share, ends in ((INSIDE, None), (OUTSIDE, t[-1])):
         wrong = v.copy()
         wrong[-1] *= np.sqrt(1.0 + share)

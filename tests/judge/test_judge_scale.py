@@ -155,10 +155,10 @@ def test_rates_of_the_force_of_a_pendulum_are_at_most_a_few_of_its_own():
 
 def test_derivatives_of_accelerations_go_through_the_inverse():
     """Mbar d(qdd) = right - dMbar qdd: |Mbar^-1| times the terms of both sides, at |qdd| and what rounding may add to it."""
-    by = tmt.derivatives(Q[0], QD[0], np.ones(6), TREE)
+    by = tmt.derivatives(TREE, Q[0], QD[0], np.ones(6))
     by = by._replace(**{name: getattr(by, name)[None] for name in ("dqdd_dq", "dqdd_dqd", "dqdd_dtau")})
-    alone, M = entries.Entries(TREE, Q[:1], QD[:1]), tmt.mass_matrix(Q[0], TREE)
-    qdd = tmt.acceleration(Q[0], QD[0], np.ones(6), TREE)
+    alone, M = entries.Entries(TREE, Q[:1], QD[:1]), tmt.mass_matrix(TREE, Q[0])
+    qdd = tmt.acceleration(TREE, Q[0], QD[0], np.ones(6))
     inverse, factored = np.abs(np.linalg.inv(M)), OF.added[0] + np.outer(*[np.sqrt(np.diag(M))] * 2)
     sizes = np.abs(qdd) + inverse @ (factored @ np.abs(qdd) + OF.force(1.0)[0])
     by_q, by_qd = (part[0] for part in alone.force_rates(sizes))
@@ -181,7 +181,7 @@ def test_the_scale_of_a_step_is_carried_through_its_exponential(dt):
 
 
 def test_errors_go_through_the_inverse_entry_by_entry():
-    M, force = tmt.mass_matrix(Q, TREE)[0], OF.force(1.0)
+    M, force = tmt.mass_matrix(TREE, Q)[0], OF.force(1.0)
     qdd = np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0]] * 2)
     root = np.sqrt(np.diag(M))
     residual = (OF.added[0] + np.outer(root, root)) @ np.abs(qdd[0]) + force[0]
@@ -197,8 +197,8 @@ ANGLES, RATES = np.random.default_rng(3).uniform(-4, 4, (2, 20, 3))
 def test_what_moves_is_the_sum_of_its_absolute_terms():
     """State by state and body by body, without the sums of the code under test."""
     for q, qd, sizes in zip(ANGLES, RATES, scale.motion_scale(tmt.ARM, ANGLES, RATES)):
-        T, B = tmt.jacobians(q)
-        v, w = tmt.convective_terms(q, qd)
+        T, B = tmt.jacobians(tmt.ARM, q)
+        v, w = tmt.convective_terms(tmt.ARM, q, qd)
         terms = np.zeros(3)
         for b in range(2):
             inertia, omega = np.array(tmt.ARM.inertia[b]), B[b] @ qd

@@ -30,11 +30,11 @@ def robots():
 def on_servos(robots):
     """The gripper where its servos, a tendon's among them, hold it at rest."""
     case = robots["gripper"].case("on servos", posture="open", torque="servos", gravity=False)
-    end = tmt.simulate(*case.start, case.tau, 5e-3, 4000, "implicitfast", case.tree).q[-1]
+    end = tmt.simulate(case.tree, *case.start, case.tau, 5e-3, 4000, "implicitfast").q[-1]
     rest = np.zeros_like(case.tau)
     for _ in range(3):  # Newton's method
-        left = case.tau - tmt.inverse_dynamics(end, rest, rest, case.tree)
-        end = end + np.linalg.solve(tmt.inverse_dynamics_derivatives(end, rest, rest, case.tree)[0], left)
+        left = case.tau - tmt.inverse_dynamics(case.tree, end, rest, rest)
+        end = end + np.linalg.solve(tmt.inverse_dynamics_derivatives(case.tree, end, rest, rest)[0], left)
     assert np.abs(left).max() < 1e-9
     fields = {name: getattr(case, name) for name in ("tree", "tau", "coordinates", "scene")}
     return Equilibrium(SimpleNamespace(q=end, **fields))
@@ -50,8 +50,8 @@ def at(robots, on_servos, name):
 def test_the_matrix_is_the_derivative_of_the_acceleration_by_movements(at):
     n, nudge, ends = at.nv, 1e-6 * np.eye(at.nv), []
     for sign in (1.0, -1.0):
-        by_q = tmt.acceleration(at.moved(sign * nudge), np.zeros((n, n)), np.tile(at.tau, (n, 1)), at.tree)
-        by_v = tmt.acceleration(np.tile(at.q, (n, 1)), sign * nudge, np.tile(at.tau, (n, 1)), at.tree)
+        by_q = tmt.acceleration(at.tree, at.moved(sign * nudge), np.zeros((n, n)), np.tile(at.tau, (n, 1)))
+        by_v = tmt.acceleration(at.tree, np.tile(at.q, (n, 1)), sign * nudge, np.tile(at.tau, (n, 1)))
         ends.append(np.concatenate([by_q, by_v]))
     differenced = (ends[0] - ends[1]).T / 2e-6
     assert np.abs(at.matrix[n:] - differenced).max() < 1e-7 * np.abs(at.matrix).max()

@@ -29,7 +29,7 @@ def of_scipy(tree, q, qd, tau, duration, tolerance):
         p, v = x[:nq], x[nq:]
         return [
             *tree.coordinates.component_rates(p.tolist(), v.tolist()),
-            *tmt.acceleration(p / length(p), v, tau, tree),
+            *tmt.acceleration(tree, p / length(p), v, tau),
         ]
 
     def length(p):
@@ -48,7 +48,7 @@ def test_its_error_and_evaluations_are_those_of_dop853(tree, tolerance):
     """Within a factor of 20 and of 1.3: the norm of an error is another, and so is the first step."""
     q, qd, tau = random_state(np.random.default_rng(4), tree)
     truth = trajectory(tree, q, qd, tau, 1.0, 1).high[-1]
-    motion = tmt.simulate(q, qd, tau, 1.0, 1, ADAPTIVE, tree, tolerance)
+    motion = tmt.simulate(tree, q, qd, tau, 1.0, 1, ADAPTIVE, tolerance)
     theirs, evaluations = of_scipy(tree, q, qd, tau, 1.0, tolerance)
     errors = [np.abs(x - truth).max() for x in (np.concatenate([motion.q[-1], motion.qd[-1]]), theirs)]
     assert errors[1] / 20.0 <= errors[0] <= 20.0 * errors[1]
@@ -59,7 +59,7 @@ def test_its_error_and_evaluations_are_those_of_dop853(tree, tolerance):
 def test_a_step_whose_error_is_no_number_is_refused():
     """Springs of 1e4 N m/rad: the stages of a first step of dt / 8 overflow. SciPy's answer is that of its smaller steps."""
     stiff = replace(tmt.ARM, stiffness=(1e4,) * 3)
-    motion = tmt.simulate(BENT, Z, Z, 0.5, 1, ADAPTIVE, stiff)
+    motion = tmt.simulate(stiff, BENT, Z, Z, 0.5, 1, ADAPTIVE)
     expected, evaluations = of_scipy(stiff, BENT, Z, Z, 0.5, 1e-9)
     assert motion.ended is None and np.abs(motion.q[-1] - expected[:3]).max() < 1e-5
     assert motion.evaluations < 2.0 * evaluations
@@ -68,12 +68,14 @@ def test_a_step_whose_error_is_no_number_is_refused():
 def test_its_evaluations_have_a_limit(monkeypatch):
     """That of a run: one that needs just as many goes on, one that needs one step more ends; the others do not."""
     starts = np.array([BENT, Z, -BENT])
-    free = tmt.simulate(starts, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12)
-    alone = [tmt.simulate(start, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12).evaluations for start in starts]
+    free = tmt.simulate(tmt.ARM, starts, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12)
+    alone = [
+        tmt.simulate(tmt.ARM, start, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12).evaluations for start in starts
+    ]
     assert free.evaluations == sum(alone)
     for limit, ends in ((max(alone) + 1, 0), (max(alone), 1), (min(alone), 3)):
         monkeypatch.setattr(runner, "MOST_EVALUATIONS", limit)
-        motion = tmt.simulate(starts, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12)
+        motion = tmt.simulate(tmt.ARM, starts, Z, Z, 0.1, 20, ADAPTIVE, tolerance=1e-12)
         why = [reason for reason in motion.ended if reason]
         assert len(why) == ends and all("evaluations" in reason for reason in why)
         assert motion.evaluations <= 3 * limit + STAGES * 3
@@ -91,15 +93,16 @@ LONG = {  # runs of minutes
 @pytest.mark.parametrize("q, dt, steps, more", LONG.values(), ids=LONG)
 def test_ctrl_c_interrupts_a_run(q, dt, steps, more, monkeypatch):
     monkeypatch.setattr(runner, "MOST_EVALUATIONS", 10**12)
-    tmt.simulate(q, Z, Z, 1e-3, 2, **more | {"every": 1})  # is compiled
+    model, more = more.get("model", tmt.ARM), {name: x for name, x in more.items() if name != "model"}
+    tmt.simulate(model, q, Z, Z, 1e-3, 2, **more | {"every": 1})  # is compiled
     main = threading.main_thread().ident
     timer = threading.Timer(0.1, signal.pthread_kill, (main, signal.SIGINT))
     begun = time.perf_counter()
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        tmt.simulate(q, Z, Z, dt, steps, **more)
+        tmt.simulate(model, q, Z, Z, dt, steps, **more)
     assert time.perf_counter() - begun < 20.0
-    assert tmt.simulate(q, Z, Z, 1e-3, 2, **more | {"every": 1}).evaluations > 0
+    assert tmt.simulate(model, q, Z, Z, 1e-3, 2, **more | {"every": 1}).evaluations > 0
 
 
 def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
@@ -113,21 +116,21 @@ def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
 
     tree, q, qd = wrist(), [0.5, 0.8, 1.0], [0.3, 0.0, -0.2]
     for method in ("rk4", ADAPTIVE):
-        whole = tmt.simulate(q, qd, Z, 1e-4, 6000, method, tree)
+        whole = tmt.simulate(tree, q, qd, Z, 1e-4, 6000, method)
         monkeypatch.setattr(np, "full", full)
-        few = tmt.simulate(q, qd, Z, 1e-4, 6000, method, tree, every=3000)
+        few = tmt.simulate(tree, q, qd, Z, 1e-4, 6000, method, every=3000)
         monkeypatch.setattr(np, "full", made)
         assert not tree.never_singular and max(sizes) <= 1025 * 64 * 3 and len(few.q) == 3
         assert np.array_equal(few.q, whole.q[::3000]) and np.array_equal(few.qd, whole.qd[::3000])
         assert few.ended == whole.ended and few.evaluations == whole.evaluations
         monkeypatch.setattr(simulation, "STEPS", 7)
-        short = tmt.simulate(q, qd, Z, 0.02, 30, method, tree)
+        short = tmt.simulate(tree, q, qd, Z, 0.02, 30, method)
         monkeypatch.setattr(simulation, "STEPS", 1024)
-        whole = tmt.simulate(q, qd, Z, 0.02, 30, method, tree)
+        whole = tmt.simulate(tree, q, qd, Z, 0.02, 30, method)
         assert np.array_equal(short.q, whole.q) and short.evaluations == whole.evaluations
     starts = np.array([[0.5, 0.0, 1.0], *np.tile(q, (70, 1)), [0.5, 0.0, 1.0]])
-    many = tmt.simulate(starts, qd, Z, 1e-3, 2100, "rk4", tree, every=7)
-    one = tmt.simulate(q, qd, Z, 1e-3, 2100, "rk4", tree, every=7)
+    many = tmt.simulate(tree, starts, qd, Z, 1e-3, 2100, "rk4", every=7)
+    one = tmt.simulate(tree, q, qd, Z, 1e-3, 2100, "rk4", every=7)
     assert (
         [k for k in range(72) if many.ended[k]] == [0, 71]
         and "'a', 'c'" in many.ended[0]
@@ -135,7 +138,7 @@ def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
     )
     assert np.array_equal(many.q[70], one.q) and np.isnan(many.q[71, 1:]).all()
     monkeypatch.setattr(simulation, "STEPS", 1)  # the time of an end is that from the start
-    assert tmt.simulate(q, [1.0, 0.0, 0.0], [1e3] * 3, 0.01, 40, "rk4", tree).ended.startswith(
+    assert tmt.simulate(tree, q, [1.0, 0.0, 0.0], [1e3] * 3, 0.01, 40, "rk4").ended.startswith(
         "at t = 0.02 s"
     )
 
@@ -143,7 +146,7 @@ def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
 def test_a_motion_of_one_unit_takes_the_steps_that_its_error_wants():
     """A slide under a constant force has no error at all, and grows its steps sixfold from an eighth of dt."""
     slide = one_body([(0, 0, 1)], ["slide"], com=(0, 0, 0.1))
-    motion = tmt.simulate([0.0], [1.0], [2.0], 1.0, 1, ADAPTIVE, slide)
+    motion = tmt.simulate(slide, [0.0], [1.0], [2.0], 1.0, 1, ADAPTIVE)
     fallen = [1.0 + (2.0 - 9.81) / 2.0, 1.0 + 2.0 - 9.81]
     assert np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - fallen).max() < 1e-14
     assert motion.evaluations == 3 * STAGES  # 1 / 8 s, then the rest in pieces of at most 6 / 8 s
@@ -152,7 +155,7 @@ def test_a_motion_of_one_unit_takes_the_steps_that_its_error_wants():
 def test_errors_are_relative_to_the_larger_end_of_a_step():
     """A spring that pulls a slide from 0 to 2000 m: SciPy takes the larger of both too."""
     tree = one_body([(1, 0, 0)], ["slide"], stiffness=[100.0], rest=[1000.0], gravity=(0.0, 0.0, 0.0))
-    motion = tmt.simulate([0.0], [0.0], [0.0], 0.3, 1, ADAPTIVE, tree, 1e-10)
+    motion = tmt.simulate(tree, [0.0], [0.0], [0.0], 0.3, 1, ADAPTIVE, 1e-10)
     _, evaluations = of_scipy(tree, np.zeros(1), np.zeros(1), np.zeros(1), 0.3, 1e-10)
     assert abs(motion.q[-1, 0] - 1000.0 * (1.0 - np.cos(3.0))) < 1e-5
     assert evaluations / 1.3 <= motion.evaluations <= 1.3 * evaluations

@@ -34,11 +34,11 @@ def compiled(tree, *quantities):
 def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
     """Of any batch, as 50 digits have it; and a state has the same bits alone and among others."""
     function, takes = getattr(tmt, quantity), QUANTITIES[quantity].takes
-    assert (*signature(function).parameters,) == (*takes, "model")
+    assert (*signature(function).parameters,) == ("model", *takes)
     tree, states = compiled(SMALL, quantity), random_states(rng, SMALL, 21)
     given = states[: len(takes)]
-    expected, every = (in_parts(call(*given, tree)) for call in (literal.literal(quantity), function))
-    M = literal.mass_matrix(states[0], tree)
+    expected, every = (in_parts(call(tree, *given)) for call in (literal.literal(quantity), function))
+    M = literal.mass_matrix(tree, states[0])
     condition = np.linalg.cond(M).max() if literal.is_solved(quantity) else 1.0
     truth = exact(SMALL, *(rows[0] for rows in states), **{"qdd": states[2][0]} if "qdd" in takes else {})
     for field, values, bits in zip(FIELDS[quantity], expected, every, strict=True):
@@ -48,7 +48,7 @@ def test_machine_code_answers_what_the_literal_form_returns(quantity, rng):
     for batch in ((), (21,), (3, 7), (2, 0)):
         size = int(np.prod(batch))
         some = [rows[:size].reshape(*batch, rows.shape[1]) for rows in given]
-        for result, bits in zip(in_parts(function(*some, tree)), every, strict=True):
+        for result, bits in zip(in_parts(function(tree, *some)), every, strict=True):
             assert type(result) is np.ndarray and result.dtype == float
             assert result.flags.c_contiguous and result.flags.writeable
             assert np.array_equal(result, bits[:size].reshape(batch + bits.shape[1:]))
@@ -60,7 +60,7 @@ def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
     parts = 0, slice(1), slice(90), slice(500), slice(501)
 
     def bits(function, *of_parts):
-        return [function(*states[:, part], tree).tobytes() for part in of_parts]
+        return [function(tree, *states[:, part]).tobytes() for part in of_parts]
 
     first = bits(tmt.acceleration, *parts)
     assert bits(tmt.acceleration, *parts[::-1])[::-1] == bits(tmt.acceleration, *parts) == first
@@ -70,7 +70,7 @@ def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
     prepared = bits(tmt.acceleration, *parts)
     assert all(x != y for x, y in zip(prepared, of_numpy)) and prepared[-1] == first[-1]
     for mass in range(1, answers.MOST + 2):  # of other models the last ones are held
-        tmt.mass_matrix(np.zeros(3), dataclasses.replace(tmt.ARM, mass=(mass, 1.5)))
+        tmt.mass_matrix(dataclasses.replace(tmt.ARM, mass=(mass, 1.5)), np.zeros(3))
     assert bits(tmt.acceleration, *parts) == prepared
     assert answers.recent.cache_info().currsize <= answers.MOST
 
@@ -78,7 +78,7 @@ def test_a_call_gives_the_same_bits_whatever_was_asked_before(rng):
 def test_threads_change_no_bit(monkeypatch, rng):
     """Neither those of the states of one question, nor several questions at once; nor if none can be started any more."""
     tree, states = compiled(SMALL), random_states(rng, SMALL, 200)
-    alone, used = tmt.acceleration(*states, tree), []
+    alone, used = tmt.acceleration(tree, *states), []
 
     def refuse(*_):
         raise RuntimeError("cannot schedule new futures")
@@ -86,14 +86,14 @@ def test_threads_change_no_bit(monkeypatch, rng):
     monkeypatch.setattr(evaluator, "cores", lambda: 3)
     monkeypatch.setattr(cores, "ThreadPoolExecutor", lambda n: used.append(n) or ThreadPoolExecutor(n))
     monkeypatch.setattr(evaluator, "SHARED", 1)
-    assert np.array_equal(tmt.acceleration(*states, tree), alone) and used == [3]
+    assert np.array_equal(tmt.acceleration(tree, *states), alone) and used == [3]
     monkeypatch.setattr(ThreadPoolExecutor, "submit", refuse)
-    assert np.array_equal(tmt.acceleration(*states, tree), alone) and used == [3, 3]
+    assert np.array_equal(tmt.acceleration(tree, *states), alone) and used == [3, 3]
     monkeypatch.undo()
 
     def ask(k):
         state = [x[k] for x in states]
-        return all(np.array_equal(tmt.acceleration(*state, tree), alone[k]) for _ in range(100))
+        return all(np.array_equal(tmt.acceleration(tree, *state), alone[k]) for _ in range(100))
 
     with ThreadPoolExecutor(8) as pool:
         assert all(pool.map(ask, range(8)))
@@ -115,7 +115,7 @@ def test_machine_code_refuses_what_the_literal_form_refuses(model, given, says):
     compiled(model, "acceleration", "mass_matrix")
     for acceleration in (literal.acceleration, tmt.acceleration):
         with pytest.raises(ValueError, match=says):
-            acceleration(*given, model)
+            acceleration(model, *given)
 
 
 @pytest.mark.filterwarnings("error")
@@ -125,11 +125,14 @@ def test_numbers_beyond_the_largest_double():
     compiled(slide, "potential_energy")
     for q in (np.array([1.7e308]), np.full((2, 1), 1.7e308)):  # its energy is infinite, and nothing is NaN
         with pytest.raises(ValueError, match="largest double"):
-            tmt.potential_energy(q, slide)
+            tmt.potential_energy(slide, q)
     for qd in (np.full(3, 1e200), np.full((2, 3), 1e200)):
-        assert np.array_equal(tmt.energy(Z, qd), literal.energy(Z, qd)) and np.isinf(tmt.energy(Z, qd)).all()
+        assert (
+            np.array_equal(tmt.energy(tmt.ARM, Z, qd), literal.energy(tmt.ARM, Z, qd))
+            and np.isinf(tmt.energy(tmt.ARM, Z, qd)).all()
+        )
 
 
 def test_a_short_question_never_waits_for_a_compiler():
-    program = "import sys, tmt; tmt.acceleration(*[[0.1] * 3] * 3); print('llvmlite' in sys.modules)"
+    program = "import sys, tmt; tmt.acceleration(tmt.ARM, *[[0.1] * 3] * 3); print('llvmlite' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout == "False\n"

@@ -72,7 +72,7 @@ def with_50_digits(name, *state):
 
 
 TYPES = {
-    "float": lambda _: lambda name, *state: getattr(tmt, name)(*state, TREE),
+    "float": lambda _: lambda name, *state: getattr(tmt, name)(TREE, *state),
     "compiled": lambda _: lambda name, *state: Evaluator(TREE, name).of_one(*state),
     "pairs": lambda _: lambda name, q, *_: exact_of_many(TREE, name, q[None], *np.zeros((2, 1, 3))).high[0],
     "50 digits": lambda _: with_50_digits, "Python": lambda _: executed("python"), "C": compiled_c,
@@ -105,13 +105,13 @@ def test_a_spring_at_any_turn_is_that_of_mujoco(angle):
     for axis in AXES:
         data.qpos = turned(angle, axis)
         mujoco.mj_forward(model, data)
-        assert np.abs(tmt.spring_torque(data.qpos, TREE) + data.qfrc_spring).max() <= 1e-14
+        assert np.abs(tmt.spring_torque(TREE, data.qpos) + data.qfrc_spring).max() <= 1e-14
 
 
 def test_a_quaternion_of_nearly_length_1_has_the_turn_of_one_of_length_1():
     q = turned(2.0)
     for size in (1.0 - 0.9e-6, 1.0 + 0.9e-6):
-        assert np.abs(tmt.spring_torque(size * q, TREE) - tmt.spring_torque(q, TREE)).max() <= 1e-14
+        assert np.abs(tmt.spring_torque(TREE, size * q) - tmt.spring_torque(TREE, q)).max() <= 1e-14
 
 
 def test_a_motion_that_starts_at_half_a_turn_swings_back():

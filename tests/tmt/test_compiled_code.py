@@ -104,15 +104,15 @@ def test_runs_together_have_the_bits_of_each_alone(name, counts):
     most, dt = counts[-1], 0.3 if METHODS[name].adaptive else 0.02  # of the steps of its own some are refused
     q, qd, tau = starts(most)
     qd[1], tau[most // 2 + 1] = 1e200, 1e300
-    alone = [tmt.simulate(*run, dt, 6, name, SMALL) for run in zip(q, qd, tau)]
+    alone = [tmt.simulate(SMALL, *run, dt, 6, name) for run in zip(q, qd, tau)]
     for count in counts:
-        batch = tmt.simulate(q[:count], qd[:count], tau[:count], dt, 6, name, SMALL)
+        batch = tmt.simulate(SMALL, q[:count], qd[:count], tau[:count], dt, 6, name)
         assert np.array_equal(batch.q, [one.q for one in alone[:count]], equal_nan=True)
         assert np.array_equal(batch.qd, [one.qd for one in alone[:count]], equal_nan=True)
         assert batch.ended.tolist() == [one.ended for one in alone[:count]]
         assert batch.evaluations == sum(one.evaluations for one in alone[:count])
     assert [k for k in range(most) if batch.ended[k]] == [1, most // 2 + 1]
-    third = tmt.simulate(q, qd, tau, dt, 6, name, SMALL, every=3)
+    third = tmt.simulate(SMALL, q, qd, tau, dt, 6, name, every=3)
     assert np.array_equal(third.t, batch.t[::3])
     assert all(np.array_equal(x[:, ::3], y, equal_nan=True) for x, y in zip(batch[1:], third[1:]))
     assert batch.evaluations == third.evaluations and np.array_equal(batch.ended, third.ended)
@@ -141,8 +141,8 @@ def test_several_cores_give_the_bits_of_one(monkeypatch):
     monkeypatch.setattr(runner, "SPREAD", 0)
     for name in ("rk4", "implicit_midpoint"):
         monkeypatch.setattr(runner, "cores", lambda: 1)
-        one = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
+        one = tmt.simulate(SMALL, q, qd, tau, 0.02, 6, name)
         monkeypatch.setattr(runner, "cores", lambda: 3)
-        three = tmt.simulate(q, qd, tau, 0.02, 6, name, SMALL)
+        three = tmt.simulate(SMALL, q, qd, tau, 0.02, 6, name)
         assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, three)) and one.ended[40]
         assert one.evaluations == three.evaluations and np.array_equal(one.ended, three.ended)

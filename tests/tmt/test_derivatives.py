@@ -62,13 +62,13 @@ def test_derivatives_are_those_of_31_digits_entry_by_entry(name, rng):
     """And machine code's, in closed form or by dual numbers."""
     tree = model(name)
     q, qd, tau = random_states(rng, tree, 3)
-    qdd, by = tmt.acceleration(q, qd, tau, tree), tmt.derivatives(q, qd, tau, tree)
+    qdd, by = tmt.acceleration(tree, q, qd, tau), tmt.derivatives(tree, q, qd, tau)
     entries = Entries(tree, q, qd)
     scales = entries.derivatives(tau, qdd, by), entries.force_rates(tau)
     for quantity, scale in zip(("derivatives", "inverse_dynamics_derivatives"), scales):
         truth = exact_of_many(tree, quantity, q, qd, tau)
         compiled = Evaluator(tree, quantity).of_any(q, qd, tau)
-        for found in (getattr(tmt, quantity)(q, qd, tau, tree), compiled):
+        for found in (getattr(tmt, quantity)(tree, q, qd, tau), compiled):
             for k, (values, allowed) in enumerate(zip(found, scale, strict=True)):
                 assert (truth.part(k).distance(values) <= FACTOR * EPS * allowed).all()
 
@@ -88,17 +88,17 @@ def test_derivatives_are_the_limits_of_differences(make, rng):
     """Of every kind of joint, with damping, springs, armature and gains of a controller."""
     tree = make()
     (q,), (qd,), (tau,) = random_states(rng, tree, 1)
-    by, n = tmt.derivatives(q, qd, tau, tree), len(qd)
-    expected = differences(tree, lambda *state: tmt.acceleration(*state, tree), q, qd, tau)
+    by, n = tmt.derivatives(tree, q, qd, tau), len(qd)
+    expected = differences(tree, lambda *state: tmt.acceleration(tree, *state), q, qd, tau)
     assert close(np.hstack(by[:3]), expected)
-    qdd = tmt.acceleration(q, qd, tau, tree)
-    expected = differences(tree, lambda *state: tmt.inverse_dynamics(*state, tree), q, qd, qdd)
+    qdd = tmt.acceleration(tree, q, qd, tau)
+    expected = differences(tree, lambda *state: tmt.inverse_dynamics(tree, *state), q, qd, qdd)
     assert close(np.hstack(by[3:]), expected[:, : 2 * n])
-    assert close(tmt.mass_matrix(q, tree), expected[:, 2 * n :])
-    assert np.allclose(by.dqdd_dtau, tmt.inverse_mass_matrix(q, tree), rtol=1e-12, atol=1e-12)
-    assert np.allclose(by.dqdd_dtau @ tmt.mass_matrix(q, tree), np.eye(n), atol=1e-11)
-    assert np.abs(tmt.inverse_dynamics(q, qd, qdd, tree) - tau).max() <= 1e-10
-    for values, alone in zip(by[3:], tmt.inverse_dynamics_derivatives(q, qd, qdd, tree), strict=True):
+    assert close(tmt.mass_matrix(tree, q), expected[:, 2 * n :])
+    assert np.allclose(by.dqdd_dtau, tmt.inverse_mass_matrix(tree, q), rtol=1e-12, atol=1e-12)
+    assert np.allclose(by.dqdd_dtau @ tmt.mass_matrix(tree, q), np.eye(n), atol=1e-11)
+    assert np.abs(tmt.inverse_dynamics(tree, q, qd, qdd) - tau).max() <= 1e-10
+    for values, alone in zip(by[3:], tmt.inverse_dynamics_derivatives(tree, q, qd, qdd), strict=True):
         assert np.allclose(values, alone, rtol=1e-11, atol=1e-11)
 
 
@@ -112,14 +112,14 @@ LONE = "rk4", "semi_implicit_euler", "implicit", "implicitfast", "discrete"
 def test_a_and_b_are_the_limits_of_differences_of_a_step(method, make, rng):
     tree, dt = make(), 0.05
     (q,), (qd,), (tau,) = random_states(rng, tree, 1)
-    A, B = tmt.step_derivatives(q, qd, tau, dt, method, tree)
+    A, B = tmt.step_derivatives(tree, q, qd, tau, dt, method)
     fixed = "dopri8" if method == "dopri8_adaptive" else method  # one step of that size
 
     def after(*state):
-        _, q_path, qd_path = tmt.simulate(*state, dt, 1, fixed, tree)
+        _, q_path, qd_path = tmt.simulate(tree, *state, dt, 1, fixed)
         return np.concatenate([tree.coordinates.difference(q_path[1], reached), qd_path[1]])
 
-    reached = tmt.simulate(q, qd, tau, dt, 1, fixed, tree).q[1]
+    reached = tmt.simulate(tree, q, qd, tau, dt, 1, fixed).q[1]
     assert close(np.hstack([A, B]), differences(tree, after, q, qd, tau))
 
 
@@ -128,12 +128,12 @@ def test_a_and_b_are_the_limits_of_differences_of_a_step(method, make, rng):
 )
 def test_a_compiled_step_has_the_derivatives_of_31_digits(method, tree, rng):
     q, qd, tau = random_states(rng, tree, 2)
-    by, dt = tmt.derivatives(q, qd, tau, tree), np.full((2, 1), 0.02)
+    by, dt = tmt.derivatives(tree, q, qd, tau), np.full((2, 1), 0.02)
     entries = Entries(tree, q, qd)
-    scale = entries.step(0.02, by, entries.derivatives(tau, tmt.acceleration(q, qd, tau, tree), by))
+    scale = entries.step(0.02, by, entries.derivatives(tau, tmt.acceleration(tree, q, qd, tau), by))
     name = f"step_derivatives:{method}"
     truth = exact_of_many(tree, name, q, qd, tau, dt)
-    both = np.concatenate(tmt.step_derivatives(q, qd, tau, 0.02, method, tree), axis=2)
+    both = np.concatenate(tmt.step_derivatives(tree, q, qd, tau, 0.02, method), axis=2)
     for found in (both, Evaluator(tree, name).of_any(q, qd, tau, dt)):
         assert (truth.distance(found) <= FACTOR * EPS * scale).all()
 
@@ -142,7 +142,7 @@ def test_stages_that_are_solved_for_have_the_derivatives_of_50_digits(rng):
     tree = tmt.ARM.lock({"alpha": 0.5})
     q, qd, tau = (values[0] for values in random_states(rng, tree, 1))
     truth = exact(tree, q, qd, tau, step=("implicit_midpoint", 0.02)).step_derivatives
-    found = np.hstack(tmt.step_derivatives(q, qd, tau, 0.02, "implicit_midpoint", tree))
+    found = np.hstack(tmt.step_derivatives(tree, q, qd, tau, 0.02, "implicit_midpoint"))
     assert distance(found, truth).max() <= FACTOR * EPS * np.abs(found).max()
 
 
@@ -155,22 +155,22 @@ def with_site(tree, joint, rng):
 def test_a_frame_moves_as_its_jacobian_says(rng):
     tree = with_site(kinds(), len(kinds().kind) - 1, rng)
     (q,), (qd,), (tau,) = random_states(rng, tree, 1)
-    found, n = tmt.frame("tool", q, qd, tree), len(qd)
-    rates = differences(tree, lambda q, *_: tmt.frame("tool", q, model=tree).position, q, qd, tau)
+    found, n = tmt.frame(tree, "tool", q, qd), len(qd)
+    rates = differences(tree, lambda q, *_: tmt.frame(tree, "tool", q).position, q, qd, tau)
     assert close(found.jacobian[:3], rates[:, :n])
-    turned = differences(tree, lambda q, *_: tmt.frame("tool", q, model=tree).rotation, q, qd, tau)
+    turned = differences(tree, lambda q, *_: tmt.frame(tree, "tool", q).rotation, q, qd, tau)
     spin = np.einsum("ijk,lj->ilk", turned, found.rotation)
     assert close(found.jacobian[3:], np.stack([spin[2, 1], spin[0, 2], spin[1, 0]])[:, :n])
-    changes = differences(tree, lambda q, *_: tmt.frame("tool", q, model=tree).jacobian @ qd, q, qd, tau)
+    changes = differences(tree, lambda q, *_: tmt.frame(tree, "tool", q).jacobian @ qd, q, qd, tau)
     assert close(found.convective, changes[:, :n] @ qd)
-    assert np.array_equal(tmt.frame("tool", q, model=tree).convective, np.zeros(6))
-    body = tmt.frame(tree.body_names[-1], q, model=tree)
+    assert np.array_equal(tmt.frame(tree, "tool", q).convective, np.zeros(6))
+    body = tmt.frame(tree, tree.body_names[-1], q)
     assert np.allclose(body.position + body.rotation @ tree.site_offset[0], found.position, atol=1e-13)
 
 
 def test_a_locked_tree_keeps_its_sites(rng):
     tree = with_site(tmt.ARM, 2, rng)
     forearm = tree.lock({"alpha": 0.7, "beta": -0.4})
-    found, expected = tmt.frame("tool", [0.3], model=forearm), tmt.frame("tool", [0.7, -0.4, 0.3], model=tree)
+    found, expected = tmt.frame(forearm, "tool", [0.3]), tmt.frame(tree, "tool", [0.7, -0.4, 0.3])
     for part, whole in zip(found[:2], expected[:2]):
         assert np.allclose(part, whole, atol=1e-14)

@@ -50,18 +50,18 @@ def assert_close(found, expected, scale=1.0, digits=1e-7):
 def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_changes_it(drawn):
     """By the power of the torque less what dampers take."""
     tree, q, qd, tau, _ = drawn
-    M, qdd = tmt.mass_matrix(q, tree), tmt.acceleration(q, qd, tau, tree)
+    M, qdd = tmt.mass_matrix(tree, q), tmt.acceleration(tree, q, qd, tau)
     assert np.array_equal(M, M.T) and np.linalg.eigvalsh(M)[0] > 0.0
-    inverse = tmt.inverse_mass_matrix(q, tree)
+    inverse = tmt.inverse_mass_matrix(tree, q)
     assert np.array_equal(inverse, inverse.T) and np.array_equal(
-        tmt.derivatives(q, qd, tau, tree)[2], inverse
+        tmt.derivatives(tree, q, qd, tau)[2], inverse
     )
-    kinetic = tmt.energy(q, qd, tree) - tmt.potential_energy(q, tree)
-    assert_close(kinetic, qd @ M @ qd / 2, abs(tmt.potential_energy(q, tree)), 64 * EPS)
-    right = tau - tree.damping * qd - tmt.spring_torque(q, tree) - tmt.bias(q, qd, tree)
+    kinetic = tmt.energy(tree, q, qd) - tmt.potential_energy(tree, q)
+    assert_close(kinetic, qd @ M @ qd / 2, abs(tmt.potential_energy(tree, q)), 64 * EPS)
+    right = tau - tree.damping * qd - tmt.spring_torque(tree, q) - tmt.bias(tree, q, qd)
     assert_close(M @ qdd, right, np.abs(M).max() * np.abs(qdd).max(), 256 * EPS)
     there = [np.array(tree.coordinates.move(list(q), list(h * qd))) for h in (STEP, -STEP)]
-    ends = [tmt.energy(q, qd + h * qdd, tree) for q, h in zip(there, (STEP, -STEP))]
+    ends = [tmt.energy(tree, q, qd + h * qdd) for q, h in zip(there, (STEP, -STEP))]
     power = tau @ qd - tree.damping @ qd**2
     assert_close((ends[0] - ends[1]) / (2.0 * STEP), power, np.abs(ends).max() + np.abs(qdd).max() ** 2)
 
@@ -74,13 +74,13 @@ def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
         frames = method.joint_frames(tree, list(q))
         return np.array([[list(row) for row in frames[joint].turn] for joint in tree.body_joint])
 
-    T, B = tmt.jacobians(q, tree)
-    assert_close(T, by_each(tree, lambda q: tmt.com_positions(q, tree), q))
+    T, B = tmt.jacobians(tree, q)
+    assert_close(T, by_each(tree, lambda q: tmt.com_positions(tree, q), q))
     spin = np.einsum("bji,bjkn->bikn", turns(q), by_each(tree, turns, q))  # R' dR = [omega]x in body axes
     assert_close(B, np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1))
-    assert_close(tmt.angular_velocities(q, qd, tree), B @ qd, 10.0, 64 * EPS)
-    rates = [along(tree, lambda q, part=part: tmt.jacobians(q, tree)[part] @ qd, q, qd) for part in (0, 1)]
-    for found, expected in zip(tmt.convective_terms(q, qd, tree), rates):
+    assert_close(tmt.angular_velocities(tree, q, qd), B @ qd, 10.0, 64 * EPS)
+    rates = [along(tree, lambda q, part=part: tmt.jacobians(tree, q)[part] @ qd, q, qd) for part in (0, 1)]
+    for found, expected in zip(tmt.convective_terms(tree, q, qd), rates):
         assert_close(found, expected, np.abs(qd).sum() ** 2)
 
 
@@ -115,10 +115,10 @@ def test_a_locked_tree_is_the_sub_block_of_the_whole(drawn, data):
     assert smaller.joint_names == tuple(name for i, name in enumerate(tree.joint_names) if i not in locked)
     assert smaller.damping == tuple(tree.damping[k] for k in by)
     for found, whole in (
-        (tmt.mass_matrix(q[at], smaller), tmt.mass_matrix(q, tree)[np.ix_(by, by)]),
-        (tmt.bias(*state, smaller), tmt.bias(q, qd, tree)[by]),
-        (tmt.spring_torque(q[at], smaller), tmt.spring_torque(q, tree)[by]),
-        (tmt.com_positions(q[at], smaller), tmt.com_positions(q, tree)),
+        (tmt.mass_matrix(smaller, q[at]), tmt.mass_matrix(tree, q)[np.ix_(by, by)]),
+        (tmt.bias(smaller, *state), tmt.bias(tree, q, qd)[by]),
+        (tmt.spring_torque(smaller, q[at]), tmt.spring_torque(tree, q)[by]),
+        (tmt.com_positions(smaller, q[at]), tmt.com_positions(tree, q)),
     ):
         assert_close(found, whole, digits=1e-12)
 

@@ -146,18 +146,19 @@ ENDS = {
 def test_a_run_says_why_it_ended(method, start, more, says):
     """Alone, between the states that are kept, and among others, which go on."""
     arguments = {"dt": 0.1, "steps": 200, "method": method} | more
-    motion = tmt.simulate(*start, **arguments)
+    model = arguments.pop("model", tmt.ARM)
+    motion = tmt.simulate(model, *start, **arguments)
     last = int(np.isfinite(motion.q).all(axis=1).sum()) - 1
     assert motion.ended.startswith(f"at t = {last * arguments['dt']:g} s") and says in motion.ended
     assert 0 <= last < 200 and np.isnan(motion.q[last + 1 :]).all() and np.isnan(motion.qd[last + 1 :]).all()
-    some = tmt.simulate(*start, **arguments, every=40)
+    some = tmt.simulate(model, *start, **arguments, every=40)
     assert some.ended == motion.ended and np.array_equal(some.q, motion.q[::40], equal_nan=True)
     rows = [np.array([value] * 9, dtype=float) for value in ([0.5, 1.0, 1.0], REST, REST)]
     for row, value in zip(rows, start):
         row[4] = value
     short = arguments | {"steps": min(200, last + 2)}
     if method == "rk4":
-        among = tmt.simulate(*rows, **short)
+        among = tmt.simulate(model, *rows, **short)
         assert among.ended[4] == motion.ended
         assert np.array_equal(among.q[4], motion.q[: short["steps"] + 1], equal_nan=True)
         assert [k for k in range(9) if k != 4 and among.ended[k]] == [] or "dt" in more or "model" in more
@@ -165,7 +166,7 @@ def test_a_run_says_why_it_ended(method, start, more, says):
 
 def test_a_hinge_whose_motion_does_not_depend_on_its_angle_ends_at_the_limit():
     alone = one_body([(0.0, 1.0, 0.0)], gravity=(0.0, 0.0, 0.0))
-    assert "2^49" in tmt.simulate([FAST], [50.0], [0.0], 0.1, 5, model=alone).ended
+    assert "2^49" in tmt.simulate(alone, [FAST], [50.0], [0.0], 0.1, 5).ended
 
 
 def test_where_newton_fails_one_step_is_an_error():
@@ -190,11 +191,11 @@ def test_the_last_state_of_a_run_is_looked_at():
 
 
 def test_a_motion_is_three_arrays_and_more():
-    motion = tmt.simulate(BENT, REST, REST, 0.1, 5)
+    motion = tmt.simulate(tmt.ARM, BENT, REST, REST, 0.1, 5)
     t, q, qd = motion
     assert len(motion) == 3 and motion[0] is motion.t is t and q is motion.q and qd is motion.qd
     assert isinstance(motion, tuple) and motion.ended is None and motion.evaluations == 20
-    batch = tmt.simulate([[BENT, BENT]], [[REST, [1e200] * 3]], REST, 0.1, 5)
+    batch = tmt.simulate(tmt.ARM, [[BENT, BENT]], [[REST, [1e200] * 3]], REST, 0.1, 5)
     assert batch.evaluations == 4 * (5 + 1) and batch.ended.shape == (1, 2)
     assert batch.ended[0, 0] is None and "2^49" in batch.ended[0, 1]
     for again in (copy.deepcopy(batch), pickle.loads(pickle.dumps(batch))):
@@ -205,14 +206,14 @@ def test_a_motion_is_three_arrays_and_more():
 
 def test_taylor_is_the_true_motion_of_each_run(rng):
     starts, tau = rng.uniform(-1, 1, (2, 3)), rng.uniform(-1, 1, (2, 3))
-    motion = tmt.simulate(starts, REST, tau, 0.1, 6, "taylor")
+    motion = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1, 6, "taylor")
     assert motion.ended.tolist() == [None, None] and motion.evaluations >= 2
-    near = tmt.simulate(starts, REST, tau, 0.1 / 256, 6 * 256, "dopri8", every=256)
+    near = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1 / 256, 6 * 256, "dopri8", every=256)
     assert np.abs(near.q - motion.q).max() < 1e-13 and np.array_equal(near.t, motion.t)
     assert np.array_equal(motion.q[:, 0], starts)
-    second = tmt.simulate(starts[1], REST, tau[1], 0.1, 6, "taylor", every=2)
+    second = tmt.simulate(tmt.ARM, starts[1], REST, tau[1], 0.1, 6, "taylor", every=2)
     assert np.array_equal(second.q, motion.q[1, ::2]) and second.ended is None
-    loose = tmt.simulate(starts, REST, tau, 0.5, 3, "taylor", tolerance=1e-6)
-    assert loose.evaluations < tmt.simulate(starts, REST, tau, 0.5, 3, "taylor").evaluations
+    loose = tmt.simulate(tmt.ARM, starts, REST, tau, 0.5, 3, "taylor", tolerance=1e-6)
+    assert loose.evaluations < tmt.simulate(tmt.ARM, starts, REST, tau, 0.5, 3, "taylor").evaluations
     stiff = dataclasses.replace(tmt.ARM, damping=(1e6, 0.0, 0.0))
-    assert "series" in tmt.simulate(BENT, REST, REST, 0.1, 5, "taylor", stiff).ended
+    assert "series" in tmt.simulate(stiff, BENT, REST, REST, 0.1, 5, "taylor").ended

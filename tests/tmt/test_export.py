@@ -49,7 +49,7 @@ CHAIN = one_body(
 @pytest.mark.parametrize("name", PLAIN)
 def test_python_gives_the_same_values(name):
     states = states_of(TREE)[: len(QUANTITIES[name].takes)]
-    found, expected = module(TREE, name)[name](*states), getattr(tmt, name)(*states, model=TREE)
+    found, expected = module(TREE, name)[name](*states), getattr(tmt, name)(TREE, *states)
     assert near(*((x if isinstance(x, tuple) else (x,)) for x in (found, expected)))
 
 
@@ -61,7 +61,7 @@ def test_c_compiles_without_a_warning_and_gives_the_same_values_in_any_number_of
     """Values that parts hand on stand in an array whose places are used again."""
     kind, (rtol, atol) = (np.float32, (2e-3, 1e-4)) if single else (np.float64, (1e-11, 1e-12))
     states, results = [x[0].astype(kind) for x in states_of(TREE)], []
-    expected = tmt.acceleration(*(x.astype(float) for x in states), TREE)
+    expected = tmt.acceleration(TREE, *(x.astype(float) for x in states))
     (tmp_path / "robot.h").write_text(tmt.equations(TREE, "c header", ["acceleration"], single=single))
     for longest in (10_000, 30):
         monkeypatch.setattr(c, "LONGEST", longest)
@@ -145,7 +145,7 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
     exec(tmt.equations(tree, "python", list(names), parameters=words), found)
     values = gravity, six[0], masses[0], coms[0], masses[1], coms[1], six[1]
     for name, states in names.items():
-        expected = getattr(tmt, name)(*states, model=other)
+        expected = getattr(tmt, name)(other, *states)
         assert np.allclose(found[name](*states, *values), expected, rtol=1e-9, atol=1e-11)
 
 
@@ -174,7 +174,7 @@ def test_a_body_keeps_its_own_frame_where_a_site_of_its_name_is_on_another_joint
         )
         assert np.allclose(
             module(tree, "frame_pose:a b")["frame_pose_a_b"](np.zeros(3))[:, 3],
-            tmt.frame("a_b", np.zeros(3), model=tree)[0],
+            tmt.frame(tree, "a_b", np.zeros(3))[0],
         )
 
 

@@ -69,8 +69,8 @@ def test_which_gains_are_implicit(name, speed, position):
     """The matrix and the force of the linear system, written out."""
     stepping, dt, k = METHODS[name], 0.01, np.diag(FORK.stiffness) * (name == "discrete")
     bias = np.array(method.bias_rates(FORK, q, qd)) * (name == "implicit")
-    matrix = tmt.mass_matrix(q, FORK) + dt * (np.diag(FORK.damping) + bias + speed) + dt**2 * (k + position)
-    force = tau - P @ q - S @ qd - tmt.bias(q, qd, FORK) - FORK.damping * qd - tmt.spring_torque(q, FORK)
+    matrix = tmt.mass_matrix(FORK, q) + dt * (np.diag(FORK.damping) + bias + speed) + dt**2 * (k + position)
+    force = tau - P @ q - S @ qd - tmt.bias(FORK, q, qd) - FORK.damping * qd - tmt.spring_torque(FORK, q)
     force -= dt * (k + position) @ qd
     dynamics = derivatives.Linearized()
     a = stepping.slope(DRIVEN, list(q), list(qd), list(tau), dt, dynamics)
@@ -103,12 +103,12 @@ def test_implicitfast_takes_the_bias_of_a_free_body_implicitly_if_it_is_alone(tr
     """The linear system, with differences of the bias, which is a square of the speeds."""
     q = np.array(tree.coordinates.move(list(tree.zero), [0.3, -0.2, 0.5, 0.4, 0.1, -0.6, 0.2]))
     qd, tau, dt = np.array([0.5, -1.0, 2.0, 1.5, -0.7, 0.3, 1.1]), np.linspace(-1.0, 1.0, 7), 0.1
-    rates = [(tmt.bias(q, qd + u, tree) - tmt.bias(q, qd - u, tree)) / 2.0 for u in np.eye(7)]
-    matrix = tmt.mass_matrix(q, tree) + dt * np.diag(tree.damping)
+    rates = [(tmt.bias(tree, q, qd + u) - tmt.bias(tree, q, qd - u)) / 2.0 for u in np.eye(7)]
+    matrix = tmt.mass_matrix(tree, q) + dt * np.diag(tree.damping)
     matrix[list(lone)] += dt * np.transpose(rates)[list(lone)]
-    force = tau - 0.1 * qd - tmt.bias(q, qd, tree)
+    force = tau - 0.1 * qd - tmt.bias(tree, q, qd)
     expected = qd + dt * np.linalg.solve(matrix, force)
-    assert np.abs(tmt.simulate(q, qd, tau, dt, 1, "implicitfast", tree).qd[1] - expected).max() < 1e-10
+    assert np.abs(tmt.simulate(tree, q, qd, tau, dt, 1, "implicitfast").qd[1] - expected).max() < 1e-10
 
 
 def test_a_locked_joint_takes_its_gains_along_unless_others_feel_its_position():
@@ -135,13 +135,13 @@ def test_a_method_of_ones_own(rng, monkeypatch):
     mine = method_named("mine")
     assert mine.stages == 2 and not (mine.adaptive or mine.solves_stages)
     q, qd, tau = rng.uniform(-1, 1, (3, 9, 3))
-    found, same = (tmt.simulate(q, qd, tau, 0.01, 20, name) for name in ("mine", "tableau"))
+    found, same = (tmt.simulate(tmt.ARM, q, qd, tau, 0.01, 20, name) for name in ("mine", "tableau"))
     assert found.evaluations == same.evaluations == 9 * 20 * 2
     assert all(np.allclose(a, b, rtol=0, atol=1e-12) for a, b in zip(found, same))
     with pytest.raises(ValueError, match="tolerance"):
-        tmt.simulate(BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)
+        tmt.simulate(tmt.ARM, BENT, REST, REST, 0.1, 1, "mine", tolerance=1e-6)
     monkeypatch.setitem(METHODS, "mine", METHODS["explicit_euler"])  # is used at once
-    assert not np.allclose(tmt.simulate(q, qd, tau, 0.01, 20, "mine").q, same.q, rtol=0, atol=1e-6)
+    assert not np.allclose(tmt.simulate(tmt.ARM, q, qd, tau, 0.01, 20, "mine").q, same.q, rtol=0, atol=1e-6)
 
 
 class Longer(RungeKutta):
@@ -164,7 +164,7 @@ def test_another_step_or_slope_is_taken_and_not_kept(own, form, folder, monkeypa
     rk4 = METHODS["rk4"]
     stepping = own(rk4.order, rk4.A, rk4.b, rk4.c)
     monkeypatch.setitem(METHODS, "mine", stepping)
-    motion = tmt.simulate(BENT, [1.0] * 3, REST, 0.01, 2, "mine")
+    motion = tmt.simulate(tmt.ARM, BENT, [1.0] * 3, REST, 0.01, 2, "mine")
     state = BENT.tolist(), [1.0] * 3
     for k in (1, 2):
         state = one_step(stepping, tmt.ARM, *state, [0.0] * 3, 0.01)
@@ -176,4 +176,4 @@ def test_another_step_or_slope_is_taken_and_not_kept(own, form, folder, monkeypa
 def test_what_is_no_method_is_refused(own, monkeypatch):
     monkeypatch.setitem(METHODS, "mine", own)
     with pytest.raises(ValueError, match=r"^METHODS\['mine'\] is .* is expected$"):
-        tmt.simulate(BENT, REST, REST, 0.1, 1, "mine")
+        tmt.simulate(tmt.ARM, BENT, REST, REST, 0.1, 1, "mine")

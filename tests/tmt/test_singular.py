@@ -21,16 +21,16 @@ def test_a_step_from_a_singular_state_has_no_derivatives_and_says_why(method, q)
     """Where the method takes nothing implicitly that makes its matrix regular."""
     tree = wrist() if method in IMPLICIT else DAMPED
     with pytest.raises(ValueError, match=r"singular.*'a', 'c'"):
-        tmt.step_derivatives(np.array([[0.5, 0.3, 1.0], q]), Z, Z, 0.01, method, tree)
+        tmt.step_derivatives(tree, np.array([[0.5, 0.3, 1.0], q]), Z, Z, 0.01, method)
     tmt.prepare(tree, "step_derivatives:rk4")
     with pytest.raises(ValueError, match=r"singular.*'a', 'c'"):
-        tmt.step_derivatives(q, Z, Z, 0.01, "rk4", tree)
+        tmt.step_derivatives(tree, q, Z, Z, 0.01, "rk4")
 
 
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_damping_that_is_implicit_makes_a_step_regular(method):
     qd, tau, dt, h = np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.0, 0.2]), 0.05, 1e-6
-    A, B = tmt.step_derivatives(AT_ZERO, qd, tau, dt, method, DAMPED)
+    A, B = tmt.step_derivatives(DAMPED, AT_ZERO, qd, tau, dt, method)
 
     def after(x):
         return np.concatenate(
@@ -79,20 +79,20 @@ def test_a_slide_that_takes_its_mass_to_the_axis_of_a_hinge_is_singular_there_al
     for r, is_singular in ((0.0, True), (0.98 * least, True), (1.02 * least, False), (0.3, False)):
         if is_singular:
             with pytest.raises(ValueError, match="hinge 'a' turns without moving any mass"):
-                tmt.acceleration([0.2, r], [0.0, 0.0], [0.1, 0.2], tree)
+                tmt.acceleration(tree, [0.2, r], [0.0, 0.0], [0.1, 0.2])
         else:
-            qdd = tmt.acceleration([0.2, r], [0.0, 0.0], [0.1, 0.2], tree)
+            qdd = tmt.acceleration(tree, [0.2, r], [0.0, 0.0], [0.1, 0.2])
             expected = (0.1 + 9.81 * r * np.cos(0.2)) / r**2, 0.2 + 9.81 * np.sin(0.2)
             assert np.allclose(qdd, expected, rtol=1e-9)
-    motion = tmt.simulate([0.2, 0.0], [0.0, 0.0], [0.0, 0.0], 0.01, 5, model=tree)
+    motion = tmt.simulate(tree, [0.2, 0.0], [0.0, 0.0], [0.0, 0.0], 0.01, 5)
     assert motion.ended.startswith("at t = 0 s") and "hinge 'a' turns" in motion.ended
 
 
 def test_slides_that_a_hinge_between_them_makes_parallel_are_singular_there():
     tree = one_body([X, np.eye(3)[2], Y], ["slide", "hinge", "slide"])
-    assert not tree.never_singular and np.isfinite(tmt.acceleration(Z, Z, Z, tree)).all()
+    assert not tree.never_singular and np.isfinite(tmt.acceleration(tree, Z, Z, Z)).all()
     with pytest.raises(ValueError, match="slides 'a', 'c' move together without moving any mass"):
-        tmt.acceleration([0.0, np.pi / 2.0, 0.0], Z, Z, tree)
+        tmt.acceleration(tree, [0.0, np.pi / 2.0, 0.0], Z, Z)
 
 
 @pytest.mark.parametrize("mass, is_known", [(0.9e-6, False), (1.1e-6, True)])

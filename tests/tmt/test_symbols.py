@@ -60,7 +60,7 @@ def assert_right(symbols, tree, rng, states=100):
         numbers = {symbol: row.value for symbol, row in symbols.parameters.items()}
         function = sympy.lambdify(variables, list(symbols.entries[name].subs(numbers)), "numpy", cse=True)
         values = function(*columns)
-        expected = getattr(tmt, name)(*state, tree)
+        expected = getattr(tmt, name)(tree, *state)
         found = np.stack([np.broadcast_to(value, states) for value in values], axis=-1)
         found = found.reshape(expected.shape)
         assert (np.abs(found - expected) <= 64 * EPS * getattr(scale, SCALES[name])).all(), name

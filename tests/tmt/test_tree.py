@@ -51,9 +51,9 @@ def test_what_cannot_be_is_refused_in_one_line(tree, changes, word):
 
 def test_a_state_of_a_ball_is_refused_by_its_name():
     with pytest.raises(ValueError, match=r"'a'.*quaternion"):
-        tmt.mass_matrix([1.1, 0.0, 0.0, 0.0, 0.0], SLIDE_ON_A_BALL)
+        tmt.mass_matrix(SLIDE_ON_A_BALL, [1.1, 0.0, 0.0, 0.0, 0.0])
     with pytest.raises(ValueError, match=r"5.*slide.*ball"):
-        tmt.mass_matrix(np.zeros(4), SLIDE_ON_A_BALL)
+        tmt.mass_matrix(SLIDE_ON_A_BALL, np.zeros(4))
 
 
 def chain(axes, com=(0.3, 0.1, 0.2), inertia=POINT, **more):
@@ -88,7 +88,7 @@ def test_a_body_with_inertia_for_every_hinge_is_never_singular(rng):
     trees = [tree for tree in (random_tree(rng, bodies=2) for _ in range(30)) if tree.never_singular]
     assert 5 < len(trees) < 25
     for tree in trees:
-        assert np.linalg.cond(tmt.mass_matrix(rng.uniform(-3, 3, (50, len(tree.parent))), tree)).max() < 1e9
+        assert np.linalg.cond(tmt.mass_matrix(tree, rng.uniform(-3, 3, (50, len(tree.parent))))).max() < 1e9
 
 
 def test_a_tree_is_shown_in_one_short_line_and_stated_by_all_its_numbers(rng):

@@ -23,7 +23,7 @@ def test_a_scene_is_known_to_1e_30_times_the_growth_and_errors_are_taken_from_bo
     assert known.apart <= reference.LOST * growth and known.why is None
     assert np.array_equal(known.high[0], np.concatenate(BENT.start)) and not known.low[0].any()
     assert known.t.tolist() == (np.arange(65) * 5 / 64).tolist() and known.steps < 1000
-    finer = tmt.simulate(*BENT.start, BENT.tau, 5.0 / 2**13, 2**13, "dopri8", BENT.tree).q[::128]
+    finer = tmt.simulate(BENT.tree, *BENT.start, BENT.tau, 5.0 / 2**13, 2**13, "dopri8").q[::128]
     assert known.error(finer).max() < 64 * growth * eps
     high, low = known.high[:, :3], known.low[:, :3]
     assert 1e-18 < np.abs(known.low).max() < 1e-14
@@ -43,7 +43,7 @@ def test_the_accuracy_of_a_run_in_doubles_is_that_of_its_speeds_too():
     fast = BENT.changed(name="fast", speed=(500.0, 300.0, 800.0), duration=1.0, dt=1 / 64)
     doubles, runs = reference.in_doubles(fast), []
     for steps in (doubles.steps // 2, doubles.steps):
-        motion = tmt.simulate(*fast.start, fast.tau, 1.0 / steps, steps, "dopri8", fast.tree)
+        motion = tmt.simulate(fast.tree, *fast.start, fast.tau, 1.0 / steps, steps, "dopri8")
         runs.append([values[:: steps // 64] for values in (motion.q, motion.qd)])
     of_q, of_speeds = (np.abs(coarse - fine).max() for coarse, fine in zip(*runs))
     assert of_speeds > 3.0 * of_q and doubles.apart == of_speeds

@@ -116,6 +116,15 @@ class State:
         return [*changes, self.factors.inverted(), *self.torque_rates]
 
     @property
+    def coriolis_matrix(self) -> Rows:
+        nothing = [0.0] * len(self.qd)
+        if self.form.rates is None:
+            rates = method.bias_rates(self.tree, self.q, self.qd, self.form.terms)
+        else:
+            rates = self.form.rates(self.tree, self.q, self.qd, nothing)[1]
+        return method.coriolis_matrix(self.tree, self.qd, self.mass_matrix, rates)
+
+    @property
     def potential_energy(self) -> Scalar:
         return method.potential(self.bodies, self.tree.gravity) + method.spring_energy(self.tree, self.q)
 
@@ -147,7 +156,7 @@ class State:
 
 class Quantity(NamedTuple):
     takes: tuple[str, ...]  # of "q", "qd", "tau" or "qdd", "dt"
-    shape: tuple[int | str, ...]  # m bodies, nv speeds; 2nv and 3nv
+    shape: tuple[int | str, ...]  # m bodies, nv speeds; multiples of them
     unit: str
     of: Callable[[State], Any]  # -> nested lists of scalars in that shape
     parts: tuple[str, ...] = ()  # the names of the arrays of which there are several, in that order
@@ -187,6 +196,19 @@ QUANTITIES = {
     "derivatives": Quantity(TAU, (5, "nv", "nv"), "SI", lambda s: s.derivatives, BY_STATE, is_long=True),
     "inverse_dynamics_derivatives": Quantity(
         QDD, (2, "nv", "nv"), "N m/rad; N m s/rad", lambda s: list(s.torque_rates), BY_STATE[3:], is_long=True
+    ),
+    "coriolis_matrix": Quantity(
+        QD, ("nv", "nv"), "N m s/rad", lambda s: s.coriolis_matrix, is_long=True
+    ),
+    "com": Quantity(Q, (3,), "m", lambda s: list(method.centre_of_mass(s.bodies)[0]), has_forms=False),
+    "com_jacobian": Quantity(
+        Q, (3, "nv"), "m/rad", lambda s: method.centre_of_mass(s.bodies)[1], has_forms=False
+    ),
+    "centroidal_momentum_matrix": Quantity(
+        Q, (6, "nv"), "kg m/rad; kg m2/rad", lambda s: method.centroidal_momentum(s.bodies), has_forms=False
+    ),
+    "regressor": Quantity(
+        QDD, ("nv", "10m"), "SI", lambda s: method.regressor(s.tree, s.q, s.qd, s.qdd), is_long=True, has_forms=False
     ),
     "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy, has_forms=False),
     "energy": Quantity(QD, (), "J", lambda s: s.energy, has_forms=False),
@@ -232,5 +254,5 @@ def argument_of(name: str) -> str:
 
 def shape_of(name: str, tree: AnyTree) -> tuple[int, ...]:
     n = len(tree.axis)
-    sizes = {"m": len(tree.mass), "nv": n, "2nv": 2 * n, "3nv": 3 * n}
+    sizes = {"m": len(tree.mass), "10m": 10 * len(tree.mass), "nv": n, "2nv": 2 * n, "3nv": 3 * n}
     return tuple(size if isinstance(size, int) else sizes[size] for size in quantity_of(name).shape)

@@ -8,7 +8,6 @@ from functools import lru_cache
 from textwrap import wrap
 from typing import Any
 
-from tmt.arm import ARM
 from tmt.compiled import forms
 from tmt.compiled.straight import Traced
 from tmt.derivation.mechanism import AnyTree
@@ -48,7 +47,7 @@ SI units, angles in rad. Shapes are those of one state; ... stands for any batch
 
 
 def equations(
-    model: Tree = ARM,
+    model: Tree,
     language: str = "c",
     quantities: Sequence[str] = ("mass_matrix", "bias", "acceleration"),
     *,
@@ -62,7 +61,7 @@ def equations(
 
     Parameters
     ----------
-    model : Tree, default ARM
+    model : Tree
     language : {"c", "c header", "python", "matlab", "casadi", "jax", "latex", "html", "sympy"}
         C99 with math.h alone, no allocation; Python with NumPy alone, any batch; MATLAB and Octave, one file,
         states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
@@ -83,7 +82,7 @@ def equations(
 
     Examples
     --------
-    >>> print(tmt.equations(language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
+    >>> print(tmt.equations(tmt.ARM, language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
     return out.reshape([*batch, 3])
     """
     checked_model(model)
@@ -181,7 +180,7 @@ def function_of(model: Tree, name: str, parameters: Parameters) -> Function:
     third = "qdd" if "qdd" in quantity.takes else "tau"
     sizes = {"q": model.coordinates.nq, "qd": nv, third: nv, "dt": 1}
     sizes |= {x: len(value) for x, value in parameters.values.items()}
-    title = quantity.title or getattr(tmt, name.partition(":")[0]).__doc__.splitlines()[0]
+    title = quantity.title or f"{getattr(tmt, name).__doc__.splitlines()[0]} Unit: {quantity.unit}."
     results, shape = (quantity.parts, shape[1:]) if quantity.parts else (("out",), shape)
     takes, operations = (*quantity.takes, *parameters.values), traced(model, name, parameters)
     return Function(identifier(name), title, takes, sizes, shape, results, operations)

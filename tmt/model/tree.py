@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmt.derivation.coordinates import KINDS, Coordinates
+from tmt.derivation.coordinates import KINDS, Coordinates, Joint
 from tmt.derivation.mechanism import Indices, Mechanism, Names, Numbers, Rows
 
 from . import singular
+from .joint import Joint as JointOfTree
+from .joint import fields_of
 from .lock import locked
 from .values import CLOSE_TO_ONE, listed, names, numbers_of, shown
 
@@ -72,7 +74,7 @@ class Tree(Mechanism[float]):
     ...     body_names=["rod"], body_joint=[0], mass=[1.0], com=[(0, 0, -0.5)],
     ...     inertia=[np.diag([0.1, 0.1, 0.01])], gravity=(0, 0, -9.81),
     ... )
-    >>> print(tmt.mass_matrix([0.0], pendulum))  # 0.1 + 1 kg (0.5 m)^2
+    >>> print(tmt.mass_matrix(pendulum, [0.0]))  # 0.1 + 1 kg (0.5 m)^2
     [[0.35]]
     >>> dataclasses.replace(pendulum, mass=[2.0]).mass
     (2.0,)
@@ -129,6 +131,57 @@ class Tree(Mechanism[float]):
         names = shorten(", ".join(self.joint_names), NAMES_SHOWN, placeholder=" ...")
         return f"Tree({n} joint{'s' if n > 1 else ''}: {names}; {m} {'bodies' if m > 1 else 'body'})"
 
+    @classmethod
+    def from_joints(
+        cls, joints: Iterable[JointOfTree], gravity: ArrayLike = (0.0, 0.0, -9.81), **fields: Any
+    ) -> Tree:
+        """The tree of joints, each written with the body that it moves; at its zero all frames are parallel.
+
+        Parameters
+        ----------
+        joints : sequence of tmt.Joint
+            Each after the joint that carries it.
+        gravity : (3,), m/s2, inertial frame
+        fields : further fields of a Tree, such as site_names
+
+        Examples
+        --------
+        >>> double = tmt.Tree.from_joints([
+        ...     tmt.Joint("hip", axis=(0, 1, 0), mass=1.0, com=(0, 0, -0.5), inertia=(0.1, 0.1, 0.01)),
+        ...     tmt.Joint("knee", offset=(0, 0, -1), axis=(0, 1, 0), mass=0.5, com=(0, 0, -0.4)),
+        ... ])
+        >>> print(tmt.mass_matrix(double, [0.0, 0.0])[1, 1].round(9))  # 0.5 kg (0.4 m)^2
+        0.08
+        """
+        return cls(gravity=gravity, **fields_of(joints) | fields)  # type: ignore[arg-type]
+
+    @property
+    def nq(self) -> int:
+        """How many numbers a position has."""
+        return self.coordinates.nq
+
+    @property
+    def nv(self) -> int:
+        """How many speeds there are."""
+        return self.coordinates.nv
+
+    @property
+    def joints(self) -> tuple[Joint, ...]:
+        """Of each joint its kind and the slices of q and qd that are its own."""
+        return self.coordinates.joints
+
+    @property
+    def inertial_parameters(self) -> NDArray[np.float64]:
+        """The numbers theta (10 m,) of `regressor`: of each body mass, first moment, inertia, in its joint's frame.
+
+        kg; kg m, x y z; kg m2 about the origin of the frame, xx yy zz xy xz yz.
+        """
+        rows = []
+        for mass, com, inertia in zip(self.mass, np.array(self.com), np.array(self.inertia)):
+            J = inertia + mass * (com @ com * np.eye(3) - np.outer(com, com))
+            rows.append([mass, *mass * com, *np.diag(J), J[0, 1], J[0, 2], J[1, 2]])
+        return np.array(rows).ravel()
+
     @property
     def never_singular(self) -> bool:
         """Whether Mbar is known to be regular at every q; else it may be singular at some."""
@@ -149,7 +202,7 @@ class Tree(Mechanism[float]):
         Examples
         --------
         >>> forearm = tmt.ARM.lock({"alpha": 0.0, "beta": 0.0})
-        >>> print(forearm.joint_names, tmt.mass_matrix([0.0], forearm).round(9))
+        >>> print(forearm.joint_names, tmt.mass_matrix(forearm, [0.0]).round(9))
         ('gamma',) [[0.05275]]
         """
         return replace(self, **locked(self, angles))

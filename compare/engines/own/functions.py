@@ -127,7 +127,7 @@ def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Function]:
         has = f"{nq} positions and {nv} speeds ({', '.join(tree.joint_names)})"
         wanted = f"{coordinates.nq} and {coordinates.nv} ({', '.join(coordinates.names)})"
         raise OwnError(f"the Tree has {has}; expected {wanted}")
-    return {name: partial(getattr(tmt, method), model=tree) for name, method in METHOD_NAMES.items()}
+    return {name: partial(getattr(tmt, method), tree) for name, method in METHOD_NAMES.items()}
 
 
 def is_function(value: object) -> bool:

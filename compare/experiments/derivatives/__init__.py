@@ -86,7 +86,7 @@ def add_times(setup: Setup, subject: Subject, table: list[WayRow]) -> None:
     for row in table[:2]:
         how = row.eps or 0.0, row.way.endswith(CENTRED), subject.by
         calls[row.way] = partial(subject.stepper.derivative, start, *how)
-    calls[EXACT] = partial(tmt.step_derivatives, *state, subject.dt, subject.scheme, tree)
+    calls[EXACT] = partial(tmt.step_derivatives, tree, *state, subject.dt, subject.scheme)
     if len(subject.qd[0]) <= FEW_SPEEDS:
         table[-1].way = f"{EXACT}, compiled"
         evaluator = Evaluator(tree, f"step_derivatives:{subject.scheme}")

@@ -93,7 +93,7 @@ class Subject:
         self.stepper = Stepper(dynamics.model, dt, integrator)
         self.scheme, m = engine.methods_in(case)[integrator].scheme, self.stepper.model
         scene = *case.start, case.tau, case.scene.dt, case.steps
-        _, q, qd = tmt.simulate(*scene, "dopri8_adaptive", case.tree, tolerance=1e-9)
+        _, q, qd = tmt.simulate(case.tree, *scene, "dopri8_adaptive", tolerance=1e-9)
         reached = np.flatnonzero(np.isfinite(qd).all(axis=1))
         at = reached[np.linspace(0, len(reached) - 1, states + 1).astype(int)[1:]]
         self.q, self.qd, self.tau = q[at], qd[at], np.tile(case.tau, (states, 1))
@@ -125,7 +125,7 @@ class Subject:
     def by_torques(self) -> Array:
         """The same by torques."""
         state = self.q, self.qd, self.tau, np.full(len(self.q), self.dt)
-        return np.concatenate(tmt.step_derivatives(*state, self.scheme, self.case.tree), axis=2)
+        return np.concatenate(tmt.step_derivatives(self.case.tree, *state, self.scheme), axis=2)
 
     @cached_property
     def exact(self) -> Array:
@@ -135,8 +135,8 @@ class Subject:
     @cached_property
     def scale(self) -> Array:
         """Of each entry of [A B] by torques."""
-        state, entries = (self.q, self.qd, self.tau, self.case.tree), Entries(self.case.tree, self.q, self.qd)
-        by, qdd = tmt.derivatives(*state), tmt.acceleration(*state)
+        state, entries = (self.q, self.qd, self.tau), Entries(self.case.tree, self.q, self.qd)
+        by, qdd = tmt.derivatives(self.case.tree, *state), tmt.acceleration(self.case.tree, *state)
         return entries.step(self.dt, by, entries.derivatives(self.tau, qdd, by))
 
     @cached_property

@@ -137,7 +137,7 @@ def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics) -> li
     MuJoCo adds forces of fluid and tendons to springs and damping, of whose sum the rounding is allowed.
     """
     unexplained, tree = [], sample.tree
-    largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(sample.q, tree)).max()
+    largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(tree, sample.q)).max()
     for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most, is_rounded = float(np.abs(force).max()), allowed > 0.0

@@ -193,7 +193,7 @@ def compare_locked(result: Result, where: str, tree: Tree, smaller: Tree) -> Non
     bodies, others = tree.body_joint, smaller.body_joint
     fused = np.array([bodies.count(joint) - others.count(joint) + 1 for joint in bodies])
     scale, is_mixed = Entries(tree, q, v, np.maximum(1, fused)), "slide" in coordinates.all_kinds
-    masses, forces = zip(*((tmt.mass_matrix(q, model), tmt.bias(q, v, model)) for model in (tree, smaller)))
+    masses, forces = zip(*((tmt.mass_matrix(model, q), tmt.bias(model, q, v)) for model in (tree, smaller)))
     for name, unit, (locked, other), scales in (
         ("Mbar", "kg m2, kg m or kg" if is_mixed else "kg m2", masses, scale.mass_matrix),
         ("bias", "N m or N" if is_mixed else "N m", forces, scale.bias),

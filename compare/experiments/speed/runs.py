@@ -156,7 +156,7 @@ def measure(
             if spent > budget:
                 break
     states, nq = np.array([*paths, reference.high]), case.coordinates.nq
-    energy = tmt.energy(states[..., :nq], states[..., nq:], case.tree)
+    energy = tmt.energy(case.tree, states[..., :nq], states[..., nq:])
     for row, off in zip([row for row in rows if row.worst_error is not None], np.abs(energy - energy[-1])):
         row.energy_error = float(off.max())
     return rows

@@ -48,5 +48,5 @@ def test_a_damped_scene_and_one_without_gravity_run_as_stated():
                     duration=0.78125)  # fmt: skip
     (path,) = scene_of_case(case, Source(ARM.mjcf)).paths
     rates = -np.diff(np.log(path.v[:, 0])) / 0.078125
-    inertia = float(tmt.mass_matrix(case.q, model=case.tree)[0, 0])
+    inertia = float(tmt.mass_matrix(case.tree, case.q)[0, 0])
     assert rates == pytest.approx(0.1 / inertia, rel=1e-3)

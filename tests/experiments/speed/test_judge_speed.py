@@ -205,7 +205,7 @@ def test_after_a_run_beyond_the_budget_there_is_no_finer_one(budget, steps):
     stays = KNOWN.error(np.tile(HELD.q, (GRID + 1, 1)))
     assert rows[0].worst_error == pytest.approx(stays.max()) and rows[0].error == pytest.approx(stays[-1])
     assert rows[0].early_error == pytest.approx(stays[:13].max())  # up to 12 / 64 of 5 s
-    assert rows[0].energy_error == pytest.approx(tmt.mass_matrix(HELD.q, HELD.tree).sum() / 2.0)
+    assert rows[0].energy_error == pytest.approx(tmt.mass_matrix(HELD.tree, HELD.q).sum() / 2.0)
 
 
 def test_a_method_that_an_engine_refuses_is_a_row_and_an_engine_without_an_answer_is_not_asked_again():

@@ -121,7 +121,7 @@ def test_both_diverge_at_the_same_step_while_the_band_is_narrow(ours, theirs, wi
 
 
 def test_the_error_of_a_held_scene_is_its_distance_from_the_start_and_of_a_free_one_that_from_many_digits():
-    q = tmt.simulate(*FREE.start, FREE.tau, 5 / 64, 64, "rk4", FREE.tree).q
+    q = tmt.simulate(FREE.tree, *FREE.start, FREE.tau, 5 / 64, 64, "rk4").q
     others = [pair_of(HELD, 9.0, 9.0, scheme="implicit"), pair_of(HELD, 9.0, 9.0, steps=128)]
     free, held = pair_of(FREE), pair_of(HELD, 0.25, np.nan)
     free = replace(free, runs={"tmt": run_of(FREE, q, q), "mujoco": run_of(FREE, q + 100.0, q)})
