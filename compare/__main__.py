@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from .core.errors import Refused, described
-from .process import apart, interrupt, streams
+from .process import interrupt, streams
 
 EQUATIONS, FLEET = "equations", "fleet"
 
@@ -59,18 +59,13 @@ def run() -> int:
 
 
 if __name__ == "__main__":
-    interrupt.listen()  # before anything that takes its time
-    try:
-        streams.prepare()
-        os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")  # it clears up after an interrupt
-        # nothing is rendered: no further process looks for a display
-        os.environ.setdefault("MUJOCO_GL", "disabled")
-        # the matrices are small, and other processes compute too: threads of a product would wait for each other
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        has_own = any(":" in word for word in sys.argv[1:])  # perhaps a user's own equations
-        if has_own:
-            from compare.__main__ import run  # by a name that the child finds
-        status = apart.in_child(run) if has_own else interrupt.answered(run)
-    except KeyboardInterrupt:
-        status = interrupt.end()
-    interrupt.leave(status)
+    streams.prepare()
+    os.environ.setdefault("PYTHONWARNINGS", "ignore:resource_tracker")  # it clears up after an interrupt
+    # nothing is rendered: no further process looks for a display
+    os.environ.setdefault("MUJOCO_GL", "disabled")
+    # the matrices are small, and other processes compute too: threads of a product would wait for each other
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    from compare.__main__ import run  # by a name that the child finds
+
+    has_own = any(":" in word for word in sys.argv[1:])  # perhaps a user's own equations
+    interrupt.leave(interrupt.ended_by_signals(run, has_own))

@@ -2,7 +2,6 @@
 
 import json
 import sys
-from contextlib import ExitStack
 from functools import partial
 from types import SimpleNamespace
 
@@ -18,7 +17,6 @@ from compare.core.check import Result
 from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
 from compare.experiments.setup import Request
-from compare.process import interrupt
 from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
@@ -105,11 +103,8 @@ def test_after_an_interrupt_what_is_finished_is_reported_and_an_earlier_report_s
         return result
 
     def second(setup):
-        monkeypatch.setattr(interrupt.Now, "is_interrupted", True)
-        interrupt.at_end.close()  # as the main thread does
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(interrupt, "at_end", ExitStack())
     for name, rows in {"first": first, "second": second}.items():
         made(monkeypatch, name, rows=rows)
     only(monkeypatch, "first", "second")

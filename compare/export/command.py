@@ -4,7 +4,6 @@ import argparse
 import hashlib
 import os
 import re
-import shutil
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -20,7 +19,6 @@ from ..cli.command_line import EQUATIONS, Option, command_parser, expected, seco
 from ..core.errors import Refused
 from ..core.text import block
 from ..core.words import in_one_line
-from ..process import interrupt
 from ..report.provenance import installed
 from ..report.terminal import Terminal
 from ..robots.arm import ARM
@@ -102,7 +100,6 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             raise Refused(error) from None
 
     with terminal.progress("writes the equations"), TemporaryDirectory() as folder:
-        interrupt.at_end.callback(shutil.rmtree, folder, ignore_errors=True)
         texts = written()
         kilobytes, seconds = sum(map(len, texts.values())) / 1000, time.perf_counter() - started
         terminal.say(block("export", "written", names=list(texts), kilobytes=kilobytes, seconds=seconds))

@@ -1,91 +1,172 @@
-"""Ctrl-C, SIGTERM and SIGHUP end a run with status 2, whatever it is doing.
+"""A run in a child process, and its end by Ctrl-C, SIGTERM or SIGHUP with status 2, whatever it is doing.
 
-Python hears a signal in the main thread, between two of its own instructions: not in a compilation or in a run
-of MuJoCo. So `python -m compare` runs in a second thread, while the main one waits.
+The parent hears the signals at once, also while the child computes in C. It passes them on as SIGTERM, which is
+a KeyboardInterrupt in the child: that writes what is finished and clears up. A child that does not answer is
+killed, with all that a user's own code has started. That it has come to its end is a message, which an exit
+status cannot forge.
 """
 
 import os
+import shutil
 import signal
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, wait
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from multiprocessing import parent_process, resource_tracker
+from contextlib import ExitStack, contextmanager, suppress
+from math import inf
+from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any
 
-from .streams import Stream, say_error
+from ..core.errors import how_ended
+from . import streams
+from .files import remove_empty
 
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 POLL = 0.1  # s
 PATIENCE = 10.0  # s in a user's own function after which a log names it; a terminal shows it sooner
+ANSWER, ENDING = 0.5, 60.0  # s for a child to answer a signal, and then to write what is finished
 at_end = ExitStack()  # what ends and clears up a run; last first
 
 
 class Now:
-    lock = threading.RLock()
-    is_listening = False  # an interrupt raises no KeyboardInterrupt in the run
+    """The state of this process."""
+
+    is_listening = False  # a signal ends what the command line runs
     is_interrupted = False
-    is_settled = False  # an interrupt is too late
+    is_settled = False  # a signal is too late
+    is_undivided = False  # a signal waits
     outcome = "nothing was written"
     waits: tuple[str, float] | None = None  # a user's own function that is running, and since when
+    interrupted_in: tuple[str, float] = "", 0.0  # such a function, and for how long, s
     parent: Connection | None = None
 
 
-def listen() -> None:
-    """From now on the main thread has a KeyboardInterrupt. Ignored signals (nohup, background) stay ignored."""
-    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)
-        if number and signal.getsignal(number) is not signal.SIG_IGN:
+# in the parent
+
+
+def ended_by_signals(run: Callable[[], int], is_own: bool = False) -> int:
+    """The exit status of a run in a child; 2, with a line, after a signal, or if the child ends otherwise.
+
+    is_own: a user's own code runs there. Signals that are ignored (nohup, background) stay ignored.
+    """
+    can_fork = sys.platform == "linux" and hasattr(os, "fork")
+    context = get_context("fork") if can_fork else get_context("spawn")
+    ours, theirs = context.Pipe()
+    told: dict[str, Any] = {"outcome": Now.outcome}
+    heard = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+    child = context.Process(target=as_child, args=(run, theirs, is_own))
+    for number in heard:  # the child begins deaf to what a terminal sends to all processes
+        signal.signal(number, signal.SIG_IGN)
+    child.start()
+    theirs.close()
+    try:
+        for number in heard:
             signal.signal(number, signal.default_int_handler)
+        hear(ours, child, told, "end", inf)
+    except KeyboardInterrupt:
+        with suppress(KeyboardInterrupt):  # a second one
+            child.terminate()
+            hear(ours, child, told, "ending", ENDING if "keeps" in told else ANSWER)
+            hear(ours, child, told, "end", ENDING if "ending" in told else 0.0)
+        told.setdefault("interrupted", "")
+    for number in heard:
+        signal.signal(number, signal.SIG_IGN)
+    if "end" in told:
+        child.join(ANSWER)
+    if is_own:
+        end_group(child.pid or 0)
+    child.kill()
+    child.join()
+    if "end" in told and told["end"] is not None:
+        return int(told["end"])
+    if "end" not in told and "folder" in told:
+        unfinished, made = told["folder"]
+        shutil.rmtree(unfinished, ignore_errors=True)
+        remove_empty(made)
+    how = f"the run ended before its end{', perhaps by your equations' * is_own}: {how_ended(child.exitcode or 0)}"
+    if "interrupted" in told:
+        how = f"interrupted{told['interrupted']}"
+        with suppress(OSError):
+            os.write(2, b"\r" * os.isatty(2))  # over ^C
+    streams.say_error(f"{how}; {told['outcome']}")
+    return 2
+
+
+def hear(pipe: Connection, child: BaseProcess, told: dict[str, Any], kind: str, seconds: float) -> None:
+    """Add what a child tells, up to a message of this kind or the last one, for so long, while it is there."""
+    until = time.monotonic() + seconds
+    with suppress(EOFError, OSError):
+        while not told.keys() & {kind, "end"} and time.monotonic() < until:
+            is_there = child.is_alive()
+            if pipe.poll(POLL):
+                name, what = pipe.recv()
+                told[name] = what
+            elif not is_there:
+                return
+
+
+def end_group(leader: int = 0) -> None:
+    """Kill a process group; 0: that of this process."""
+    with suppress(OSError, AttributeError):
+        os.killpg(leader, signal.SIGKILL)
+
+
+# in the child
+
+
+def as_child(run: Callable[[], int], parent: Connection, is_own: bool) -> None:
+    if is_own and hasattr(os, "setpgrp"):
+        os.setpgrp()
+    Now.parent = parent
+    end_with_parent(end_group if is_own else None)
+    streams.prepare()
+    status = None
+    try:
+        listen()
+        status = run()
+    except KeyboardInterrupt:
+        name, seconds = Now.interrupted_in
+        with suppress(BaseException):
+            at_end.close()
+        tell("interrupted", f" while waiting for {name}, {seconds:.0f} s" if name else "")
+    tell("end", status)
+    leave(0)
+
+
+def listen() -> None:
+    """From now on SIGTERM is a KeyboardInterrupt, once."""
+
+    def heard(*_: object) -> None:
+        if Now.is_settled or Now.is_interrupted:
+            return
+        Now.is_interrupted, Now.interrupted_in = True, waited_for()
+        tell("ending")
+        if not Now.is_undivided:
+            raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, heard)
     Now.is_listening = True
 
 
-def shield(is_on: bool = True) -> None:
-    """Whether this thread, and what it starts, is deaf to what a terminal sends to all processes of a run."""
-    if hasattr(signal, "pthread_sigmask"):
-        resource_tracker.ensure_running()  # unblocks signals where it starts
-        how = signal.SIG_BLOCK if is_on else signal.SIG_UNBLOCK
-        signal.pthread_sigmask(how, (signal.SIGINT, signal.SIGHUP))
-
-
-def answered(run: Callable[[], int]) -> int:
-    """The exit status of a run; 2 after an interrupt."""
-    status: Future[int] = Future()
-
-    def carry_out() -> None:
-        shield()
-        try:
-            status.set_result(run())
-        except BaseException as error:
-            status.set_exception(error)
-
-    told = ""
+@contextmanager
+def undivided() -> Iterator[None]:
+    """A block that a signal waits for; where it settles, it is too late."""
+    was, Now.is_undivided = Now.is_interrupted, True
     try:
-        threading.Thread(target=carry_out, daemon=True).start()
-        while not wait([status], POLL).done:
-            name, seconds = waited_for()
-            if seconds > PATIENCE and name != told and not os.isatty(2):
-                say_error(f"waiting for {name}, {seconds:.0f} s")
-                told = name
-    except KeyboardInterrupt:
-        with Now.lock:
-            Now.is_interrupted = not Now.is_settled
-    return end() if Now.is_interrupted else status.result()
+        yield
+    finally:
+        Now.is_undivided = False
+    if Now.is_interrupted and not (was or Now.is_settled):
+        raise KeyboardInterrupt
 
 
-def end() -> int:
-    """Clear up after an interrupt; a further one cuts that off. The exit status."""
-    name, seconds = waited_for()
-    where = f" while waiting for {name}, {seconds:.0f} s" if name else ""
+def settle() -> None:
+    """From now on a signal does not change the exit status."""
+    Now.is_settled = True
     tell("ending")
-    Stream.silent = True  # the thread of the run goes on
-    with suppress(BaseException):
-        at_end.close()
-    with suppress(BaseException):
-        overwritten = "\r" * os.isatty(2)  # ^C
-        os.write(2, f"{overwritten}interrupted{where}; {Now.outcome}\n".encode())
-    return 2
 
 
 def waited_for() -> tuple[str, float]:
@@ -94,62 +175,35 @@ def waited_for() -> tuple[str, float]:
     return (waits[0], time.monotonic() - waits[1]) if waits else ("", 0.0)
 
 
-@contextmanager
-def ends_with(stack: ExitStack) -> Iterator[None]:
-    """Close a stack after this block, or after an interrupt."""
-    at_end.callback(stack.close)
-    with stack:
-        try:
-            yield
-        finally:
-            stay()
-
-
-@contextmanager
-def undivided() -> Iterator[None]:
-    """A block that an interrupt waits for."""
-    with nullcontext() if Now.is_interrupted else Now.lock:
-        stay()
-        yield
-
-
-def stay() -> None:
-    """Go no further after an interrupt, except in the main thread, which ends the run."""
-    if Now.is_interrupted and threading.current_thread() is not threading.main_thread():
-        threading.Event().wait()
-
-
-def settle() -> None:
-    """From now on an interrupt does not change the exit status."""
-    with undivided():
-        Now.is_settled = True
-
-
 def tell(kind: str, what: object = None) -> None:
-    """Tell the process that waits for this one; see `apart`."""
+    """Tell the process that waits for this one; see `ended_by_signals`."""
     if Now.parent:
         with suppress(OSError):
             Now.parent.send((kind, what))
 
 
 def on_interrupt(outcome: str) -> None:
-    """What an interrupt will say of the results."""
+    """What will be said of the results after a signal."""
     Now.outcome = outcome
     tell("outcome", outcome)
 
 
 def is_interrupt(error: BaseException) -> bool:
     """Whether an exception is Ctrl-C; else a user's own code raised it."""
-    return isinstance(error, KeyboardInterrupt) and not Now.is_listening
+    return isinstance(error, KeyboardInterrupt) and (Now.is_interrupted or not Now.is_listening)
 
 
 def end_with_parent(act: Callable[[], object] | None = None) -> None:
-    """From now on this process ends when its parent has, after a last act."""
+    """From now on this process ends when its parent has, after a last act. A log has for what it waits."""
 
     def watch() -> None:
-        parent = parent_process()
-        if parent:
-            parent.join()
+        parent, told = parent_process(), ""
+        while parent and parent.is_alive():
+            parent.join(POLL if Now.parent else None)
+            name, seconds = waited_for()
+            if seconds > PATIENCE and name != told and not os.isatty(2):
+                streams.say_error(f"waiting for {name}, {seconds:.0f} s")
+                told = name
         if act:
             act()
         os._exit(1)
@@ -160,5 +214,5 @@ def end_with_parent(act: Callable[[], object] | None = None) -> None:
 def leave(status: int) -> None:
     """End this process at once; what comes after main could end with another status."""
     for stream in (sys.stdout, sys.stderr):
-        Stream(stream).flush()
+        streams.Stream(stream).flush()
     os._exit(status)

@@ -48,7 +48,6 @@ def new_report(out: str | Path, shown: str | Path = "") -> Iterator[Path]:
         is_old = has_report(out)
         interrupt.on_interrupt(UNCHANGED if is_old else "no report was written")
         interrupt.tell("folder", (work, made))
-        stack.enter_context(interrupt.ends_with(stack.pop_all()))
         try:
             yield work
             exchange(work, out, shown)

@@ -1,11 +1,10 @@
 """The output of a run: lines on stdout, and on a terminal its progress on stderr."""
 
-import os
 import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from textwrap import TextWrapper
 from typing import IO, cast
 
@@ -66,16 +65,16 @@ class Terminal:
             return
         spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
         self.status = self.screen.status(self, spinner=spinner)
-        with ExitStack() as stack, interrupt.ends_with(stack):
-            stack.callback(self.stop)
+        try:
             self.status.start()
             yield
+        finally:
+            self.stop()
 
     def stop(self) -> None:
         if self.status:
             self.status.stop()
             self.status = None
-            os.write(2, (EMPTY_LINE + SHOW_CURSOR).encode() * Stream.silent)
 
     def line(self) -> str:
         """The progress, as far as there is room, no name twice; for how long, where it takes long."""

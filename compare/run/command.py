@@ -8,6 +8,7 @@ import sys
 import time
 import webbrowser
 from collections.abc import Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -104,8 +105,7 @@ def compute(
 
     def write_finished() -> None:
         """After an interrupt: the experiments that are finished, beside an earlier report."""
-        is_any = run is not None and any(name in run.clock.ended for name in names)
-        if not (interrupt.Now.is_interrupted and is_any):
+        if run is None or not any(name in run.clock.ended for name in names):
             return
         is_beside = has_report(folder.parent)
         shown = Path(options.out, INTERRUPTED) if is_beside else Path(options.out)
@@ -114,8 +114,8 @@ def compute(
         state = f"; {UNCHANGED}" if is_beside else ""
         interrupt.on_interrupt(f"the experiments that were finished are in {shown / 'index.html'}{state}")
 
-    interrupt.at_end.callback(write_finished)
-    with start_workers() as workers, terminal.progress("imports"):
+    with ExitStack() as after, start_workers() as workers, terminal.progress("imports"):
+        after.push(lambda kind, *_: write_finished() if kind is KeyboardInterrupt else None)
         for module in (DRAWING, COMPUTING)[: 1 if is_alone else 2]:  # in further processes at the same time
             workers.submit(importlib.import_module, module)
         from ..report.provenance import durations, provenance

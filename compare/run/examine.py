@@ -16,6 +16,7 @@ from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.setup import Setup, engines
+from ..process import interrupt
 from ..process.workers import Clock, Current, WorkerEnded, Workers, give_back_memory
 from ..report.terminal import Terminal
 from ..report.verdict import Figure, Section, failures
@@ -155,6 +156,7 @@ class Run:
             new = new_causes(self.setup, self.sections, self.causes)
             self.causes = new + self.causes
         self.clock.ends(name)
+        interrupt.tell("keeps")  # this, if the run is ended
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
         say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))

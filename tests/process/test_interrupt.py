@@ -29,8 +29,7 @@ def run():
     run()  # some seconds in C
     return 0
 
-interrupt.listen()
-interrupt.leave(interrupt.answered(run))
+interrupt.leave(interrupt.ended_by_signals(run))
 """
 TESTS = Path(__file__).parents[1]
 ALL = command("all", "--quick", "--out", "report")
@@ -164,8 +163,9 @@ def test_the_processes_of_a_run_that_is_killed_end_with_it(tmp_path):
 
 @posix
 def test_a_signal_that_is_ignored_stays_ignored():
-    text = "from compare.process import interrupt; interrupt.listen()\n"
-    text += "import os, signal; os.kill(os.getpid(), signal.SIGINT); print(0)"
+    text = "import os, signal, time\nfrom compare.process import interrupt\n"
+    text += "def run(): os.kill(os.getppid(), signal.SIGINT); time.sleep(0.2); print(0); return 0\n"
+    text += "interrupt.leave(interrupt.ended_by_signals(run))"
     line = ["bash", "-c", "trap '' INT; exec \"$@\"", "-", sys.executable, "-c", text]
     run = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True)
     assert (run.returncode, run.stdout, run.stderr) == (0, "0\n", "")
