@@ -5,14 +5,16 @@ The scale of an entry is the sum of the absolute values of the terms that are ad
 maximum; its tolerance is 64 eps x scale. For a body with mass m and inertia I at a state:
 
     (1)  L_i    largest possible distance of its centre of mass from the axis or anchor of joint i
-    (2)  t_i    column of T_b: L_i + W / 8 + R / 64 of a hinge or ball, 1 of a slide, 0 if i does not move it
+    (2)  t_i    column of T_b: L_i + W / 4 + R / 64 of a hinge or ball, 1 of a slide, 0 if i does not move it
     (3)  u_i    column of B_b: 1 of a hinge or ball, 0 of a slide or if i does not move it
     (4)  S, V   sums of the |rates| that turn it and that slide it; w = V + sum of t_i |rates|
     (5)  Mbar_ij = sum of k (m t_i t_j + |I| u_i u_j), and the armature
     (6)  h_i = sum of k (t_i m (2 S w + g) + u_i (m V^2 + |I| S^2))
 
-W is the largest L_i of all bodies: MuJoCo adds moments about the centre of mass of the whole tree. Terms of
-up to m W^2 cancel down to m L_i^2; each is rounded by eps m W^2, which is 64 eps m (W / 8)^2.
+W is the largest distance of the body from the centre of mass of all, at the states: MuJoCo adds moments about
+the centre of mass of what hangs on one body of the world, and a Tree does not tell which branches do. Four terms
+of m W^2 (of the inertia, twice of the moment, and of the mass) cancel down to m L_i^2; each is rounded by
+eps m W^2, together by 64 eps m (W / 4)^2.
 R is the largest distance of the body from the world's origin. Its position, and so each of its levers, is
 rounded by eps R, which is 64 eps (R / 64).
 k is the number of hinges and balls that turn the body, at least 1: each turn passes on the rounding of those
@@ -34,7 +36,7 @@ from numpy.typing import ArrayLike
 import tmt
 from tmt.model.singular import mass_matrices
 
-from .scale import FACTOR, gain_scale, levers, spring_scale
+from .scale import FACTOR, from_centre, gain_scale, levers, spring_scale
 
 
 def unit(tree: tmt.Tree, of_hinge: str, of_slide: str, of_both: str = "") -> str:
@@ -62,7 +64,7 @@ class Entries:
         self.of_speed = [i for i, joint in enumerate(tree.coordinates.joints) for _ in tree.axis[joint.qd]]
         moved, turns = joints_of_bodies[:, self.of_speed], is_turn[self.of_speed]
         self.slides, self.turns = moved & ~turns, moved & turns  # (3) u_i is that of turns, (m, nv)
-        arms = from_joints[..., self.of_speed] + from_joints.max(initial=0.0) / 8
+        arms = from_joints[..., self.of_speed] + from_centre(tree, q)[:, None] / 4
         arms = arms + self.reach.max(axis=0, initial=0.0)[:, None] / FACTOR
         self.t = self.slides + self.turns * arms  # (2), (1 or states, m, nv)
         self.mass = self.count * np.array(tree.mass)

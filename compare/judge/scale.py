@@ -34,6 +34,14 @@ def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.n
     return from_joints, from_origin
 
 
+def from_centre(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
+    """The largest distance of each centre of mass from that of all bodies, m, (m,), at q (states, nq)."""
+    places, mass = tmt.com_positions(q, tree), np.array(tree.mass)
+    apart = places - np.einsum("b,sbc->sc", mass / (mass.sum() or 1.0), places)[:, None]
+    # a run that diverges has no distance
+    return np.asarray(np.fmax.reduce(np.linalg.norm(apart, axis=2), axis=0, initial=0.0))
+
+
 def gravity_scale(tree: tmt.Tree, q: ArrayLike | None = None) -> float | np.ndarray:
     """Sum of m g times the largest distance from the origin, N m or J; at q (..., nq): (...)."""
     sums = np.linalg.norm(tree.gravity) * (levers(tree, q)[1] @ np.array(tree.mass))

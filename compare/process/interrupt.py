@@ -90,7 +90,7 @@ def ended_by_signals(run: Callable[[], int], is_own: bool = False) -> int:
     if "interrupted" in told:
         how = f"interrupted{told['interrupted']}"
         with suppress(OSError):
-            os.write(2, b"\r" * os.isatty(2))  # over ^C
+            os.write(2, b"\r\x1b[2K" * os.isatty(2))  # over ^C
     streams.say_error(f"{how}; {told['outcome']}")
     return 2
 

@@ -10,8 +10,9 @@ from trees import one_body
 import tmt
 from compare.engines.mujoco import engine, reading
 from compare.engines.mujoco.names import INTEGRATORS
+from compare.judge.entries import Entries
 from compare.judge.rounding import LEFT_OUT, OF_A_BALL, band, growth, slope_rounding, step_rounding
-from compare.judge.scale import gain_scale
+from compare.judge.scale import FACTOR, gain_scale
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
 from tmt.derivation.coordinates import coordinates_of
@@ -142,3 +143,24 @@ def test_the_band_is_infinite_from_where_a_run_diverges_or_after_the_steps_that_
     width, grown = band(*run), growth(*run, every=2)
     assert np.isfinite(width[:5]).all() and np.isinf(width[5:]).all()
     assert np.isfinite(grown[:3]).all() and np.isnan(grown[3:]).all()
+
+
+FAR = """<mujoco><worldbody><body name="post">{0}<body name="far" pos="{1} 0 0.2">
+<inertial pos="0 0 0.002" mass="0.003" diaginertia="1e-8 1e-8 1e-8"/><joint name="turn" type="{2}"/></body></body></worldbody></mujoco>"""
+HEAVY = '<inertial pos="0 0 0" mass="40" diaginertia="1 1 1"/><joint name="rail" type="slide" axis="0 1 0"/>'
+ON_THE_SAME = f'<body name="weight" pos="0 0.3 0">{HEAVY}</body>'
+
+
+@pytest.mark.parametrize("weight", [HEAVY, ON_THE_SAME])
+@pytest.mark.parametrize("kind", ["ball", "hinge"])
+@pytest.mark.parametrize("length", [0.6, 4.0])
+def test_the_tolerance_of_a_light_body_far_from_the_centre_of_mass_is_that_of_the_moments_about_it(
+    weight, kind, length
+):
+    reading_of = reading.read(FAR.format(weight, length, kind))
+    robot, tree = robot_of(reading_of, "far"), reading_of.tree
+    q = robot.coordinates.random(np.random.default_rng(3), 100)
+    M = engine(reading_of).of(robot.case()).mass_matrix(q)
+    turning = Entries(tree, q).mass_matrix[:, 1:, 1:]
+    share = np.abs(M - tmt.mass_matrix(q, tree))[:, 1:, 1:].max() / (FACTOR * EPS * turning.max())
+    assert 0.02 < share < 1.0

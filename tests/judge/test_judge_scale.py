@@ -31,7 +31,15 @@ QD = np.array([[0.5, -1.0, 2.0, 0.0, 1.0, -3.0], [0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
 REACH = np.array([[0.3 + 0.1, 0.3 + 0.2 + 0.4 + 0.2, 0.6 + 0.3]] * 2) + [[0.75, 0.75, 0.0], [0.0, 0.0, 0.0]]
 # of each body and speed
 LEVERS = np.array([[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 0, 0, 0, 0.3]])
-MOVES = SLIDES + LEVERS + TURNS * (0.6 / 8 + np.max(REACH, axis=0)[:, None] / 64)
+
+
+def apart(tree):
+    """Of each body the larger of its distances from the centre of mass, m, at both states."""
+    places = tmt.com_positions(Q, tree)
+    return np.linalg.norm(places - np.average(places, axis=1, weights=tree.mass)[:, None], axis=2).max(axis=0)
+
+
+MOVES = SLIDES + LEVERS + TURNS * (apart(TREE) / 4 + np.max(REACH, axis=0) / 64)[:, None]
 OF = entries.Entries(TREE, Q, QD)
 
 
@@ -66,10 +74,11 @@ def test_lengths_are_from_the_joint_and_have_what_slides_have_moved():
 
 
 def test_a_base_elsewhere_adds_the_rounding_of_positions_and_nothing_else():
-    """A door of 0.3 m that hangs 10 m farther away: 64 eps of its lever, and eps of its distance."""
-    moved = dataclasses.replace(TREE, offset=(*TREE.offset[:3], (0.0, -10.6, 0.0)))
+    """All of it 10 m farther away: 64 eps of each lever, and eps of the distance."""
+    offsets = (0.0, -10.0, 0.3), *TREE.offset[1:3], (0.0, -10.6, 0.0)
+    moved = dataclasses.replace(TREE, offset=offsets)
     before, after = (entries.Entries(tree, Q, QD).mass_matrix[0, 5, 5] for tree in (TREE, moved))
-    levers = 0.3 + 0.6 / 8 + np.array([0.9, 10.9]) / 64
+    levers = 0.3 + apart(TREE)[2] / 4 + np.array([0.9, 10.9]) / 64
     assert [before, after] == pytest.approx(0.02 + 1.5 * levers**2, rel=1e-13)
     assert after < 2.2 * before
 
@@ -146,7 +155,7 @@ def test_rates_of_forces_sum_what_a_movement_changes_in_each_term():
 def test_rates_of_the_force_of_a_pendulum_are_at_most_a_few_of_its_own():
     """d(tau)/dq of a bob of 2 kg at 0.5 m is at most m g l, d(tau)/dqd is 0: neither scale is far above the terms."""
     bob = one_body([(0.0, 1.0, 0.0)], com=(0.0, 0.0, -0.5), mass=[2.0], inertia=1e-9 * np.eye(3))
-    q, lever = np.linspace(-3.0, 3.0, 13)[:, None], 0.5 + 0.5 / 8 + 0.5 / 64
+    q, lever = np.linspace(-3.0, 3.0, 13)[:, None], 0.5 + 0.5 / 64
     by_q, by_qd = entries.Entries(bob, q, 3.0).force_rates(0.0)
     assert np.abs(2.0 * 9.81 * 0.5 * np.cos(q)).max() < by_q.min()
     assert by_q == pytest.approx(4.0 * 2.0 * lever * (9.81 + 2.0 * 3.0**2 * lever), rel=1e-6)
