@@ -146,7 +146,8 @@ def test_the_band_is_infinite_from_where_a_run_diverges_or_after_the_steps_that_
 
 
 FAR = """<mujoco><worldbody><body name="post">{0}<body name="far" pos="{1} 0 0.2">
-<inertial pos="0 0 0.002" mass="0.003" diaginertia="1e-8 1e-8 1e-8"/><joint name="turn" type="{2}"/></body></body></worldbody></mujoco>"""
+<inertial pos="0 0 0.002" mass="0.003" diaginertia="1e-8 1e-8 1e-8"/><joint name="turn" type="{2}"/></body>
+</body></worldbody></mujoco>"""
 HEAVY = '<inertial pos="0 0 0" mass="40" diaginertia="1 1 1"/><joint name="rail" type="slide" axis="0 1 0"/>'
 ON_THE_SAME = f'<body name="weight" pos="0 0.3 0">{HEAVY}</body>'
 

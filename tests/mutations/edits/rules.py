@@ -47,7 +47,7 @@ EDITS = (
     ("judge.scale", "motion_scale", "newton + euler", "100 * (newton + euler)", "the moving terms x 100"),
     ("judge.scale", "motion_scale", "newton + euler", "newton", "without Euler's terms"),
     ("judge.entries", "Entries.__init__", "_1[:, None] / FACTOR", "FACTOR * _0", "lengths are from the origin"),
-    ("judge.entries", "Entries.__init__", "from_centre(_1, _2)[_3] / 4", "0.0", "moments about the centre of mass have no rounding"),
+    ("judge.entries", "Entries.__init__", "from_centre(_1, _2)[_3] / 4", "0.0", "moments about the centre have no rounding"),
     ("published", "scales", "np.abs(M).max()", "100 * np.abs(M).max()", "the scale x 100"),
     ("published", "scales", "(largest / least + 1.0) * weight / least", "weight / least", "without the error of Mbar"),
     ("judge.scale", "spring_scale", "np.abs(q[..., _1]) + np.abs(_2)", "np.abs(q[..., _1])", "springs rest at zero"),
