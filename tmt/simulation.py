@@ -8,10 +8,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from tmt import feedback
 from tmt.compiled.runner import Ended, Runner, runner_of
 from tmt.methods.stepping import DIVERGED, MANY, MOST_EVALUATIONS, NEWTON, SMALL
 from tmt.model import singular, values
-from tmt.model.tree import Tree
+from tmt.model.tree import Tree, checked_model
 from tmt.model.values import shown
 
 Array = np.ndarray
@@ -55,10 +56,10 @@ class Motion(_Path):
 
 
 def simulate(
-    model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: float, steps: int, method: str = "rk4",
+    model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike | feedback.Torque, dt: float, steps: int, method: str = "rk4",
     tolerance: float | None = None, every: int = 1,
 ) -> Motion:  # fmt: skip
-    """Motion under constant torque: t (records,), s; q (..., records, nq), rad; qd (..., records, nv), rad/s.
+    """Motion under a torque: t (records,), s; q (..., records, nq), rad; qd (..., records, nv), rad/s.
 
     A run ends early, with NaN from there on, where the numbers overflow, a hinge has turned by 2^49 rad, Mbar
     is singular, Newton's method does not find the stages of an implicit method, an adaptive method would need
@@ -69,7 +70,9 @@ def simulate(
     ----------
     model : Tree
     q, qd : (..., nq) and (..., nv), rad and rad/s, state at t = 0
-    tau : (..., nv), N m, torque
+    tau : (..., nv), N m, constant; or a function of (t, q, qd), which is asked with one state and returns (nv,)
+        One that is linear in q and qd becomes gains of the model: compiled, and taken implicitly by implicit methods.
+        Any other is asked at each stage, of a method with fixed steps that solves nothing.
     dt : float, s, step, above 0
     steps : int, how many, at least 1
     method : str, a key of METHODS, or "taylor": the true motion, rounded once
@@ -87,6 +90,8 @@ def simulate(
     >>> print(t[-1], q.shape, abs(q - start).max() < 1e-12)  # it is held
     1.0 (101, 3) True
     """
+    checked_model(model)
+    model, constant, law = feedback.as_gains(model, tau) if callable(tau) else (model, tau, None)
     taylor = isinstance(method, str) and method == "taylor"
     runner = runner_of(model, "dopri8_adaptive" if taylor else method)
     stepping = runner.stepping
@@ -99,7 +104,10 @@ def simulate(
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9
     tolerance = usual if tolerance is None else values.positive("tolerance", tolerance, "a number")
-    state = values.states(model, q=q, qd=qd, tau=tau)
+    if law is not None and (stepping.adaptive or stepping.solves_stages):
+        expected = "one with fixed steps that solves nothing is expected, such as rk4"
+        raise ValueError(f"method {method!r} takes no tau that is not linear in q and qd; {expected}")
+    state = values.states(model, q=q, qd=qd, tau=constant)
     batch, runs = state[0].shape[:-1], math.prod(state[0].shape[:-1])
     *start, torque = (np.ascontiguousarray(part).reshape(runs, part.shape[-1]) for part in state)
     path_q, path_qd = values.paths(runs, steps, every, model.coordinates.nq, model.coordinates.nv)
@@ -109,6 +117,9 @@ def simulate(
     path_q[:, 0], path_qd[:, 0] = start
     if taylor:
         ended, evaluations = by_series(model, path_q, path_qd, torque, dt, every, tolerance)
+    elif law is not None:
+        codes, evaluations = feedback.follow(model, stepping, law, path_q, path_qd, dt, every)
+        ended = reasons(model, path_q, path_qd, codes, dt, tolerance)
     elif model.never_singular:
         codes, evaluations = runner.follow(path_q, path_qd, torque, dt, tolerance, every)
         ended = reasons(model, path_q, path_qd, codes, dt, tolerance)

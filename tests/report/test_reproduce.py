@@ -64,7 +64,9 @@ def test_the_worst_states_of_any_joints_are_repeated(name, experiment, tmp_path,
     given = [] if name == "arm" else ["--mjcf", str(PATHS.get(name, tmp_path / "swing.xml"))]
     script = report_of(tmp_path, experiment, *given)
     status, lines = repeated(script)
-    quantities = {"mass": ["Mbar"], "gravity": ["holding torque"], "acceleration": ["bias", "qdd"]}[experiment]
+    quantities = {"mass": ["Mbar"], "gravity": ["holding torque"], "acceleration": ["bias", "qdd"]}[
+        experiment
+    ]
     assert status == 0 and all(line.endswith("; the same") for line in lines), lines
     assert [line.split(" [")[0] for line in lines[: 2 * len(quantities) : 2]] == quantities
     assert sum("by NumPy alone" in line for line in lines) == 2
@@ -78,7 +80,11 @@ def runs(tmp_path_factory):
     (folder / "reduction.xml").write_text(SWING)
     (folder / "stability.xml").write_text(STIFF)
     scripts = {}
-    for name, more in {"mass": [], "stability": [], "reduction": ["--write", str(folder / "small.xml")]}.items():
+    for name, more in {
+        "mass": [],
+        "stability": [],
+        "reduction": ["--write", str(folder / "small.xml")],
+    }.items():
         (folder / name).mkdir()
         scripts[name] = report_of(folder / name, name, "--mjcf", str(folder / f"{name}.xml"), *more)
     return scripts
@@ -95,7 +101,9 @@ def test_a_difference_of_equations_is_repeated_and_numpy_sides_with_mujoco(tmp_p
     (tmp_path / "own.py").write_text(WRONG)
     words = "--mjcf", str(tmp_path / "swing.xml"), "--reference", f"{tmp_path / 'own.py'}:"
     status, lines = repeated(report_of(tmp_path, "mass", *words, status=1))
-    assert status == 0 and re.search(r"Mbar \[1, 1\], difference: 0\.01\d*; the report: 0\.01\d*; the same", lines[1])
+    assert status == 0 and re.search(
+        r"Mbar \[1, 1\], difference: 0\.01\d*; the report: 0\.01\d*; the same", lines[1]
+    )
     assert all(line.endswith("the same") for line in lines[2:]) and "by NumPy alone" in lines[2]
 
 
@@ -121,7 +129,11 @@ def test_a_wrong_number_of_the_report_is_found(name, runs):
     path = script.with_name("results.json")
     text = path.read_text(encoding="utf-8")
     results = json.loads(text)
-    said = [check for check in results["checks"] if check["value"] and f'"value": {check["value"]!r}' in script.read_text()]
+    said = [
+        check
+        for check in results["checks"]
+        if check["value"] and f'"value": {check["value"]!r}' in script.read_text()
+    ]
     assert said and repeated(script)[0] == 0
     said[-1]["value"] *= 1.001
     path.write_text(json.dumps(results), encoding="utf-8")
@@ -135,5 +147,7 @@ def test_a_file_that_mujoco_alone_reads_otherwise_is_said(tmp_path, capsys):
     iyz="0"/></inertial></link></robot>"""
     (tmp_path / "r.urdf").write_text(urdf)
     script = report_of(tmp_path, "mass", "--mjcf", str(tmp_path / "r.urdf"), "--floating")
-    run = subprocess.run([sys.executable, "-I", str(script)], capture_output=True, text=True, timeout=60, check=False)
+    run = subprocess.run(
+        [sys.executable, "-I", str(script)], capture_output=True, text=True, timeout=60, check=False
+    )
     assert run.returncode == 1 and "floating" in run.stderr
