@@ -36,7 +36,7 @@ def levers(tree: tmt.Tree, q: ArrayLike | None = None) -> tuple[np.ndarray, np.n
 
 def from_centre(tree: tmt.Tree, q: np.ndarray) -> np.ndarray:
     """The largest distance of each centre of mass from that of all bodies, m, (m,), at q (states, nq)."""
-    places, mass = tmt.com_positions(q, tree), np.array(tree.mass)
+    places, mass = tmt.com_positions(tree, q), np.array(tree.mass)
     apart = places - np.einsum("b,sbc->sc", mass / (mass.sum() or 1.0), places)[:, None]
     # a run that diverges has no distance
     return np.asarray(np.fmax.reduce(np.linalg.norm(apart, axis=2), axis=0, initial=0.0))

@@ -163,5 +163,5 @@ def test_the_tolerance_of_a_light_body_far_from_the_centre_of_mass_is_that_of_th
     q = robot.coordinates.random(np.random.default_rng(3), 100)
     M = engine(reading_of).of(robot.case()).mass_matrix(q)
     turning = Entries(tree, q).mass_matrix[:, 1:, 1:]
-    share = np.abs(M - tmt.mass_matrix(q, tree))[:, 1:, 1:].max() / (FACTOR * EPS * turning.max())
+    share = np.abs(M - tmt.mass_matrix(tree, q))[:, 1:, 1:].max() / (FACTOR * EPS * turning.max())
     assert 0.02 < share < 1.0

@@ -35,7 +35,7 @@ LEVERS = np.array([[0, 0, 0, 0, 0, 0], [0, 0.4 + 0.2, 0.2, 0.2, 0.2, 0], [0, 0, 
 
 def apart(tree):
     """Of each body the larger of its distances from the centre of mass, m, at both states."""
-    places = tmt.com_positions(Q, tree)
+    places = tmt.com_positions(tree, Q)
     return np.linalg.norm(places - np.average(places, axis=1, weights=tree.mass)[:, None], axis=2).max(axis=0)
 
 
