@@ -10,7 +10,6 @@ from .statements import Function, Line, Program, Syntax, statements
 
 # assignments of one function: the time of a compiler grows with the square of their number
 LONGEST = 1_000
-NAME = re.compile(r"\b[xsc]\d+\b")  # of a value
 NOT_INLINED = "#ifdef __GNUC__\n__attribute__((noinline))\n#endif"
 LEAST, MOST = 1.2e-38, 3.4e38  # of floats: what keeps a root from zero must not become zero
 
@@ -70,7 +69,7 @@ def definitions(program: Program, function: Function) -> list[str]:
     if len(lines) <= LONGEST:
         return [f"{declared(program, function)}\n{block(arrays, [line.text for line in lines])}"]
     sections = [lines[k : k + LONGEST] for k in range(0, len(lines), LONGEST)]
-    texts, size = live_out(sections)
+    texts, size = with_live_out(sections, number)
     handed, name = f"{number} w[{size}]", f"{program.name}_{function.name}"
     parts = [f"{name}_{k}" for k in range(1, 1 + len(sections))]
     heads = [f"static void {part}({arguments(program, function)}, {handed})" for part in parts]
@@ -80,25 +79,26 @@ def definitions(program: Program, function: Function) -> list[str]:
 
 
 def block(arrays: Sequence[str], lines: Sequence[str]) -> str:
-    used = {word for line in lines for word in re.findall(r"\b(\w+)\[", line)}
-    unused = [f"(void){x};" for x in arrays if x not in used]
-    return "\n".join(["{", *(f"    {line}" for line in (*unused, *lines)), "}"])
+    """The lines of a function; arrays: its arguments, which it may not all use."""
+    unused = f"    {' '.join(f'(void){x};' for x in arrays)}\n" if arrays else ""
+    return "\n".join(["{", unused + "\n".join(f"    {line}" for line in lines), "}"])
 
 
-def live_out(sections: Sequence[Sequence[Line]]) -> tuple[list[list[str]], int]:
-    """The lines of each part of a function, with w[place] for a value of an earlier one; the size of w."""
-    last = {name: k for k, lines in enumerate(sections) for line in lines for name in NAME.findall(line.text)}
-    places, size = live_out_places([[line.name for line in lines if line.name] for lines in sections], last)
-    earlier: dict[str, str] = {}
+def with_live_out(sections: Sequence[Sequence[Line]], number: str) -> tuple[list[list[str]], int]:
+    """The lines of each part of a function, with what it takes from earlier ones and hands to later ones in w; its size."""
+    last = {name: k for k, lines in enumerate(sections) for line in lines for name in line.takes}
+    made = [[line.name for line in lines if line.name] for lines in sections]
+    places, size = live_out_places(made, last)
     texts = []
-    for lines in sections:
-        text = []
-        for line in lines:
-            text.append(NAME.sub(lambda name: earlier.get(name[0], name[0]), line.text))
-            if line.name in places:
-                text.append(f"w[{places[line.name]}] = {line.name};")
-        texts.append(text)
-        earlier.update({line.name: f"w[{places[line.name]}]" for line in lines if line.name in places})
+    for names, lines in zip(made, sections):
+        taken = sorted(
+            frozenset().union(*(line.takes for line in lines)).difference(names), key=places.__getitem__
+        )
+        texts.append([
+            *(f"const {number} {name} = w[{places[name]}];" for name in taken),
+            *(line.text for line in lines),
+            *(f"w[{places[name]}] = {name};" for name in names if name in places),
+        ])  # fmt: skip
     return texts, size
 
 

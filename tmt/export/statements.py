@@ -58,7 +58,8 @@ class Syntax:
 
 class Line(NamedTuple):
     text: str
-    name: str = ""
+    takes: frozenset[str]  # the names of the values in it
+    name: str = ""  # of the value that it gives
 
 
 def statements(function: Function, syntax: Syntax) -> list[Line]:
@@ -75,8 +76,9 @@ class Writer:
         self.uses = Counter({i: len(places) for i, places in traced.places.items()})
         for i in traced.nodes:
             self.uses.update(self.tape.operands(i))
-        # the text of each node, and how it is bound
+        # the text of each node, how it is bound, and the names of the values in it
         self.known = {x.i: (name, ATOM) for x, name in zip(traced.inputs, inputs)}
+        self.takes = {x.i: frozenset[str]() for x in traced.inputs}
         self.lines = [line for i in traced.nodes for line in self.written(i)]
 
     def written(self, i: int) -> Iterator[Line]:
@@ -84,21 +86,25 @@ class Writer:
         if kind == "number":
             number = float(arguments[0])
             self.known[i] = self.syntax.number(number), SUM if number < 0.0 else ATOM
+            self.takes[i] = frozenset()
         elif kind == "sincos":
             for item in self.traced.items[i]:
                 function = ("sin", "cos")[self.tape.nodes[item][1][1]]
+                self.takes[item] = self.takes[arguments[0]]
                 yield self.assigned(item, f"{function[0]}{i}", self.call(function, arguments[0]))
         elif kind not in ("input", "item"):
             self.known[i] = self.expression(kind, arguments)
+            self.takes[i] = frozenset().union(*(self.takes[operand] for operand in arguments))
             text, _ = self.known[i]
             if self.uses[i] > 1 or len(text) > LONGEST:
                 yield self.assigned(i, f"x{i}", text)
         for place in self.traced.places.get(i, ()):
-            yield Line(self.results[place].format(value=self.text(i)))
+            yield Line(self.results[place].format(value=self.text(i)), self.takes[i])
 
     def assigned(self, i: int, name: str, value: str) -> Line:
-        self.known[i] = name, ATOM
-        return Line(self.syntax.assignment.format(name=name, value=value), name)
+        line = Line(self.syntax.assignment.format(name=name, value=value), self.takes[i], name)
+        self.known[i], self.takes[i] = (name, ATOM), frozenset((name,))
+        return line
 
     def text(self, i: int, least: int = SUM) -> str:
         text, bound = self.known[i]
