@@ -34,17 +34,17 @@ def status_of(arguments: Sequence[str]) -> int:
         from .export.command import equations_status
 
         return equations_status(arguments[1:], command)
-    from .cli.command_line import request
-
-    options = request(arguments)
-    if options.version:
+    if arguments[:1] == ["--version"]:
         from .report.provenance import OURS, installed
 
         print(OURS, installed(OURS), file=streams.Stream(sys.stdout), flush=True)
         return 0
+    from .cli.command_line import request
+
+    experiment, options = request(arguments)
     from .run.command import carry_out
 
-    return carry_out(options, command)
+    return carry_out(experiment, options, command)
 
 
 def run() -> int:

@@ -1,25 +1,23 @@
-"""The command line: words, options, help, and one line for what is mistyped."""
+"""The command line: the words of a request, its options, help, and one line for what is mistyped."""
 
 import argparse
 import shlex
-from collections.abc import Callable, Sequence
-from contextlib import suppress
-from difflib import get_close_matches
-from functools import partial
+from collections.abc import Sequence
 from textwrap import fill
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
+from ..core.options import Option, expected, name_of, options_in
 from ..core.text import block
 from ..core.words import in_one_line
 from ..experiments import EXPERIMENTS
+from ..experiments.options import Options, options_of
 from ..process.streams import PROGRAM
 
-FLEET, EQUATIONS = "fleet", "equations"  # further commands, with options of their own
+FLEET, EQUATIONS, ALL = "fleet", "equations", "all"
 LINE_WIDTH = 80
-HIGHEST_GAIN = 1e12
-ROBOT = " --mjcf robot.xml"  # of an example
 TEXT = "command_line"  # the template
 EXAMPLES = block(TEXT, "examples")
+MAY_BE_NEGATIVE = "--joints", "--posture"  # their values may begin with a minus
 
 
 class Parser(argparse.ArgumentParser):
@@ -31,109 +29,29 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: {in_one_line(' '.join(message.split()))}\n")
 
-    def add_option(self, name: str, option: "Option", template: str) -> None:
-        """Add an option; its help is the macro of its name."""
+    def add_option(self, word: str, option: Option, template: str) -> None:
+        """Add an option; its help is the macro of its name, or the one that it names."""
         values: dict[str, Any] = {"action": "store_true"}
         if option.type:
             values = {"type": option.type, "metavar": option.metavar, "default": option.default}
-        self.add_argument(name, help=" ".join(block(template, name_of(name)).split()), **values)
+        text = block(template, option.text or name_of(word))
+        self.add_argument(word, help=" ".join(text.split()), **values)
 
     def refuse_option(self, word: str, options: Sequence[str]) -> NoReturn:
-        names, name = {name.strip("-"): name for name in options}, word.strip("-").split("=")[0]
-        self.error(f"{word!r} is not an option; {expected(name, names, ' '.join(options))}")
+        """End with one line for a word that is not among the options."""
+        name = word.split("=")[0]
+        names = [option.strip("-") for option in options]
+        hint = expected(name.strip("-"), names, " ".join(options)).replace("mean ", "mean --")
+        self.error(f"{word!r} is not an option; {hint}")
 
 
-def name_of(option: str) -> str:
-    """Of --control-period: control_period."""
-    return option.strip("-").replace("-", "_")
-
-
-def not_empty(text: str) -> str:
-    if not text:
-        raise argparse.ArgumentTypeError("the name is empty")
-    return text
-
-
-def number(noun: str, least: float, most: float, kind: type[int | float] = float) -> Callable[[str], float]:
-    """A type of options: a number from `least` to `most`."""
-
-    def in_range(text: str) -> float:
-        with suppress(ValueError):
-            if least <= kind(text) <= most:
-                return kind(text)
-        wrong = f"{text!r}: expected a number from {least:g} to {most:g} ({noun})"
-        raise argparse.ArgumentTypeError(wrong)
-
-    return in_range
-
-
-seconds = partial(number, "time in s", 1e-6)  # to be called with the longest time
-process_count = number("number of processes", 1, 1024, int)
-
-
-def stated_reference(text: str) -> str:
-    """What a model is compared with; a text with a colon is read later."""
-    if text in ("arm", "model") or ":" in text or text.lower().endswith((".xml", ".mjcf", ".urdf")):
-        return text
-    choices = "arm, model, FILE.xml or .urdf, FILE.py:OBJECT or MODULE:OBJECT"
-    hint = expected(text, {"arm": "arm", "model": "model"}, choices)
-    if text.endswith(".py"):
-        hint = f"expected {text}: (all of it), or FILE.py:OBJECT"
-    raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
-
-
-class Option(NamedTuple):
-    """An option of the command line; its help is a macro of the template."""
-
-    type: Callable[[str], Any] | None = not_empty  # None: it takes no value
-    metavar: str | None = None
-    default: str | float | None = None
-    of_every: bool = False  # whether every experiment takes it; else `all`, and those whose record has it
-    example: str = ""  # of its use, in the help of those
-
-
-OPTIONS = {
-    "--out": Option(metavar="DIR", default="reports/latest", of_every=True),
-    "--quick": Option(None, of_every=True),
-    "--open": Option(None, of_every=True),
-    "--json": Option(None, of_every=True),
-    "--mjcf": Option(metavar="FILE", of_every=True),
-    "--floating": Option(None, of_every=True),
-    "--reference": Option(stated_reference, "WHAT", of_every=True),
-    "--joints": Option(metavar="LIST", example=f"{ROBOT} --reference my_equations.py:"),
-    "--scenes": Option(metavar="FILE", example=" --scenes my.toml"),
-    "--engines": Option(metavar="LIST", example=f"{ROBOT} --engines drake,mjx"),
-    "--dt": Option(seconds(5.0), "S", example=f"{ROBOT} --integrator Euler --dt 0.001"),
-    "--integrator": Option(metavar="NAME"),
-    "--posture": Option(metavar="NAME|NUMBERS"),
-    "--control-period": Option(seconds(1.0), "S", example=f"{ROBOT} --control-period 0.02 --delay 0.004"),
-    "--delay": Option(number("time in s", 0.0, 1.0), "S"),
-    "--kp": Option(number("gain", 0.0, HIGHEST_GAIN), "KP"),
-    "--kv": Option(number("gain", 0.0, HIGHEST_GAIN), "KV"),
-    "--push": Option(number("push in rad/s or m/s", 1e-9, 1e3), "P"),
-    "--error": Option(number("error", 1e-12, 1.0), "E", example=f"{ROBOT} --error 0.001"),
-    "--points": Option(metavar="NAMES"),
-    "--controls": Option(metavar="CSV", example=f"{ROBOT} --controls recorded.csv"),
-    "--write": Option(metavar="FILE", example=f"{ROBOT} --write small.xml"),
-}
-
-
-def parser(experiment: str | None = None) -> Parser:
-    """The parser of one experiment with the options that it takes, or of all."""
-    usage = f"{PROGRAM} {experiment or 'EXPERIMENT|all'} [options]"
-    if experiment:
-        made = Parser(prog=PROGRAM, usage=usage, description=help_of(experiment))
-    else:
-        lines = [f"  {name:<13} {block(name, 'summary')}" for name in EXPERIMENTS]
-        lines = [fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines]
-        of_all = [block(TEXT, "description"), "", "experiments (`all`: every one of them):", *lines]
-        made = Parser(prog=PROGRAM, usage=usage, description="\n".join(of_all), epilog=EXAMPLES)
-        made.add_argument("experiment", nargs="?", help=argparse.SUPPRESS)
-        made.add_argument("--version", action="store_true", help=block(TEXT, "version"))
+def parser(command: str) -> Parser:
+    """The parser of an experiment or of `all`, with the options that it takes and no others."""
+    text = block(TEXT, "help_of_all") if command == ALL else help_of(command)
+    made = Parser(prog=PROGRAM, usage=f"{PROGRAM} {command} [options]", description=text)
     made.add_argument("-h", "--help", action="store_true", help=block(TEXT, "help"))
-    for name, option in OPTIONS.items():
-        if option.of_every or experiment is None or name in EXPERIMENTS[experiment].options:
-            made.add_option(name, option, TEXT)
+    for word, option in options_in(options_of(command)).items():
+        made.add_option(word, option, TEXT)
     return made
 
 
@@ -150,54 +68,70 @@ def command_parser(name: str, usage: str, template: str, options: dict[str, Opti
 def help_of(experiment: str) -> str:
     record, summary = EXPERIMENTS[experiment], fill(block(experiment, "summary"), LINE_WIDTH - 1)
     examples = [" --mjcf my_arm.xml" if record.needs_file else ""]
-    examples += [OPTIONS[name].example for name in record.options if OPTIONS[name].example]
+    examples += [option.example for option in options_in(options_of(experiment)).values() if option.example]
     text = block(experiment, "help")
     return block(TEXT, "experiment", name=experiment, summary=summary, text=text, examples=examples)
 
 
-def expected(word: str, known: dict[str, str], choices: str) -> str:
-    """A hint for an unknown word: the nearest known word, or all choices."""
-    near = get_close_matches(word.casefold(), known, 1)
-    return f"did you mean {known[near[0]]}?" if near else f"expected one of {choices}"
+def help_of_all_commands() -> str:
+    summaries = {name: block(name, "summary") for name in EXPERIMENTS}
+    commands = {ALL: block(TEXT, "all")} | summaries
+    commands |= {FLEET: block(TEXT, "fleet"), EQUATIONS: block(TEXT, "equations")}
+    lines = [f"  {name:<13} {' '.join(text.split())}" for name, text in commands.items()]
+    lines = [fill(line, LINE_WIDTH, subsequent_indent=" " * 16) for line in lines]
+    return block(TEXT, "commands", lines=lines, examples=EXAMPLES)
 
 
-def request(arguments: Sequence[str]) -> argparse.Namespace:
-    """The parsed request. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
-    of_all, words = parser(), list(arguments) or ["--help"]
-    for option in ("--joints", "--posture"):  # their values may begin with a minus
+def request(arguments: Sequence[str]) -> tuple[str, Options]:
+    """The experiment, or all, and its options. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
+    words = list(arguments) or ["--help"]
+    if words[0] in ("-h", "--help"):
+        print(help_of_all_commands())
+        raise SystemExit(0)
+    command, *words = words
+    if command != ALL and command not in EXPERIMENTS:
+        refuse_command(command, arguments)
+    for option in MAY_BE_NEGATIVE:
         if option in words[:-1]:
             at = words.index(option)
             words[at : at + 2] = [f"{option}={words[at + 1]}"]
-    options, unknown = of_all.parse_known_args(words)
-    name = options.experiment
-    refuse_words(of_all, options, unknown, shlex.join(arguments))
-    if options.help:
-        (of_all if name in (None, "all") else parser(name)).print_help()
+    made = parser(command)
+    values, unknown = made.parse_known_args(words)
+    refuse_words(made, command, unknown)
+    if values.help:
+        made.print_help()
         raise SystemExit(0)
-    for option, about in OPTIONS.items():
-        takers = [other for other, record in EXPERIMENTS.items() if option in record.options]
-        is_given = vars(options)[name_of(option)]
-        if is_given and not about.of_every and name not in ("all", *takers):
-            of_all.error(f"{option} is an option of {', '.join(takers)}; {name} does not take it")
-    if options.joints and ":" not in (options.reference or ""):
-        of_all.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
-    needs_file = name in EXPERIMENTS and EXPERIMENTS[name].needs_file
-    if needs_file and not (options.mjcf or options.reference or options.version):
-        of_all.error(f"{name} needs a robot's file or equations of your own (--mjcf, --reference)")
-    return options
+    del values.help
+    options = options_of(command)(**vars(values))
+    if options.get("joints") and ":" not in (options.reference or ""):
+        made.error("--joints needs equations of your own: --reference FILE.py:OBJECT or MODULE:OBJECT")
+    needs_file = command != ALL and EXPERIMENTS[command].needs_file
+    if needs_file and not (options.mjcf or options.reference):
+        made.error(f"{command} needs a robot's file or equations of your own (--mjcf, --reference)")
+    return command, options
 
 
-def refuse_words(of_all: Parser, options: argparse.Namespace, unknown: Sequence[str], line: str) -> None:
-    name, choices = options.experiment, f"{', '.join(EXPERIMENTS)} or all"
+def refuse_command(command: str, arguments: Sequence[str]) -> NoReturn:
+    """End with one line for a first word that is no command."""
+    made, known = Parser(prog=PROGRAM), [*EXPERIMENTS, ALL, FLEET, EQUATIONS]
+    if not command.startswith("-"):
+        choices = f"{', '.join(EXPERIMENTS)} or all"
+        hint = expected(command, [*known, "help"], choices).replace("mean help", "mean --help")
+        made.error(f"{command!r} is not an experiment; {hint}")
+    later = [word for word in arguments if word in known]
+    first = later[0] if later else ALL
+    others = [word for word in arguments if word != first]
+    what = f"{first} must come first" if later else f"expected an experiment: {', '.join(EXPERIMENTS)} or all"
+    made.error(f"{what}, as in {PROGRAM} {first} {shlex.join(others)}")
+
+
+def refuse_words(made: Parser, command: str, unknown: Sequence[str]) -> None:
+    """End with one line if a word is no option of this command."""
     for word in unknown:
         if word.startswith("-"):
-            of_all.refuse_option(word, list(OPTIONS))
-    if name is None and not (options.help or options.version):
-        of_all.error(f"expected an experiment: {choices}, as in {PROGRAM} all {line}")
-    if name in (FLEET, EQUATIONS):
-        of_all.error(f"{name} must come first, before its options, as in {PROGRAM} {name} --help")
-    if name not in (None, "all", *EXPERIMENTS):
-        words = {word: word for word in (*EXPERIMENTS, "all", FLEET, EQUATIONS)} | {"help": "--help"}
-        of_all.error(f"{name!r} is not an experiment; {expected(name, words, choices)}")
+            takers = [name for name in EXPERIMENTS if word.split("=")[0] in options_in(options_of(name))]
+            if takers:
+                made.error(f"{word} is an option of {', '.join(takers)}; {command} does not take it")
+            made.refuse_option(word, list(options_in(options_of(command))))
     if unknown:
-        of_all.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")
+        made.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")

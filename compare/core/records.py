@@ -19,16 +19,15 @@ class Experiment:
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
     asks_others: bool = False  # engines beside mujoco and tmt, of which --engines has to name one
     needs_file: bool = False  # or equations of a user's own: there is nothing to say of the arm's
-    options: tuple[str, ...] = ()  # of the command line, in addition to those of every experiment
     # the most speeds of a robot for which a quick run of several experiments has it; None: any
     quick_speeds: int | None = None
     timed: bool = False  # it measures times: it runs last, while nothing else does
-    diagnosed: bool = False  # where it fails, `diagnosis` looks for the cause
     states_causes: bool = False  # its failing checks are the causes of the others
     compares: bool = True  # if not, it only says why others fail
     overview: str = ""  # the picture of the first screen that its result is part of
     # the kinds of its `top` that are on the first screen of a run of several; the others stand in its section
     first_screen: tuple[str, ...] = ()
+    runs_file: bool = False  # it asks about the file as it is, with contacts, actuators and constraints
 
 
 def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]:

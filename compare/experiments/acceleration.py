@@ -15,7 +15,7 @@ from .quantities import check_wide, compared, headline, overview
 from .setup import Setup
 
 __all__ = ["EXPERIMENT", "headline", "overview", "rows"]
-EXPERIMENT = Experiment(order=60, options=("--joints",), diagnosed=True, overview="agreement")
+EXPERIMENT = Experiment(order=60, overview="agreement")
 
 
 def rows(setup: Setup) -> Result:

@@ -1,7 +1,7 @@
 """What explains a difference in Mbar, h and accelerations, of a file's robot or of a user's equations."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ from ..core.cause import Cause
 from ..core.check import Result
 from ..core.finding import Finding
 from ..core.rows import Row, column
+from ..core.text import block
 from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import LeftOver
@@ -29,7 +30,7 @@ from ..robots.states import Sample
 from . import Drawing, Experiment
 from .setup import Setup
 
-EXPERIMENT = Experiment(order=80, needs_file=True, options=("--joints",), states_causes=True, compares=False)
+EXPERIMENT = Experiment(order=80, needs_file=True, states_causes=True, compares=False)
 SECONDS = 8.0  # of a search
 MOST_SAID = 3  # of causes that do the same
 POINTS = 61  # of a curve
@@ -89,9 +90,21 @@ class Found(NamedTuple):
         return [*self.diagnosis.causes[:MOST_SAID], *self.of_forces[:MOST_SAID]]
 
     @property
+    def said(self) -> list[Cause]:
+        """One of Mbar and h, one of accelerations: the likeliest, and in its text others that explain the same."""
+        return [one_of(causes) for causes in (self.diagnosis.causes, self.of_forces) if causes]
+
+    @property
     def share(self) -> float:
         """Of the largest difference of Mbar or h in the scale of its entry."""
         return self.ratio * FACTOR * EPS
+
+
+def one_of(causes: Sequence[Cause]) -> Cause:
+    """The first of some causes that no state can distinguish, with the others in its text."""
+    if len(causes) == 1:
+        return causes[0]
+    return replace(causes[0], text=block("causes", "causes", list=causes, most=MOST_SAID))
 
 
 @lru_cache(maxsize=2)

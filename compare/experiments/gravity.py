@@ -11,7 +11,7 @@ from .quantities import compared, headline
 from .setup import Setup
 
 __all__ = ["EXPERIMENT", "headline", "rows"]
-EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias"), options=("--joints",), diagnosed=True)
+EXPERIMENT = Experiment(order=50, asks_of_own=("gravity", "bias"))
 
 
 def rows(setup: Setup) -> Result:

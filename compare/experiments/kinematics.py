@@ -7,7 +7,7 @@ from .quantities import QUANTITIES, compared, headline
 from .setup import Setup
 
 __all__ = ["EXPERIMENT", "claim_values", "headline", "rows"]
-EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"), options=("--joints",))
+EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"))
 
 
 def quantities(robot: Robot) -> list[str]:

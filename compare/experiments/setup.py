@@ -1,11 +1,9 @@
 """The setup of an experiment: the robot, the engines, and the size of the run."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar, cast
-
-import numpy as np
+from typing import Any, TypeVar, cast
 
 from ..core.finding import Finding
 from ..engines import Dynamics, Engine, compared, made
@@ -14,9 +12,11 @@ from ..engines.own import Own
 from ..robots import Robot
 from ..robots import states as samples
 from ..robots.case import Case
+from .options import Options
 
 SECONDS_OF_OWN = 5.0  # of a user's own equations at all random states together
 Value = TypeVar("Value")
+Asked = TypeVar("Asked", bound=Options)
 
 
 def engines(mujoco: Engine, own: Engine | None = None) -> dict[str, Engine]:
@@ -35,32 +35,6 @@ def nothing(*_: Any) -> None:
     """Do nothing."""
 
 
-class Request(NamedTuple):
-    """What is asked of stability and of reduction for a file, beside its own step.
-
-    step: s, and an integrator of MuJoCo. posture: a name, or numbers with commas. push: rad/s or m/s, of every
-    speed. control_period, delay: s, of a program that commands the actuators; kp, kv: its gains, of motors.
-    error: rad or m, that is allowed; controls: times and controls by the names of actuators.
-
-    Of reduction: points: names of bodies or sites, separated by commas; write: the path of the smaller file.
-    """
-
-    step: tuple[float, str] | None = None
-    posture: str | None = None
-    control_period: float | None = None
-    delay: float | None = None
-    kp: float | None = None
-    kv: float | None = None
-    push: float | None = None
-    error: float | None = None
-    points: str | None = None
-    controls: Mapping[str, np.ndarray] | None = None
-    write: str | None = None
-
-
-NO_REQUEST = Request()
-
-
 @dataclass(frozen=True, eq=False)
 class Setup:
     """What an experiment has.
@@ -76,12 +50,16 @@ class Setup:
     reading: Reading | None = None  # of a robot's file
     quiet: Callable[[], Any] = nothing  # waits until nothing else runs: for timings
     progress: Callable[[str], Any] = nothing  # reports the progress of long work
-    tell: Callable[[str], Any] = nothing  # says what is known before an experiment ends
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
-    request: Request = NO_REQUEST  # of stability and reduction
+    options: Options = field(default_factory=Options)  # of the command line
     command: str = ""  # the words of the run
     size: str = "full"
+
+    def asked(self, kind: type[Asked]) -> Asked:
+        """The options of an experiment, as far as the run has them; the defaults of the others."""
+        names = [field.name for field in fields(kind) if hasattr(self.options, field.name)]
+        return kind(**{name: getattr(self.options, name) for name in names})
 
     @property
     def is_quick(self) -> bool:

@@ -15,8 +15,9 @@ import tmt
 from tmt.export import is_word
 from tmt.export.parameters import Parameters
 
-from ..cli.command_line import EQUATIONS, Option, command_parser, expected, seconds
+from ..cli.command_line import EQUATIONS, command_parser
 from ..core.errors import Refused
+from ..core.options import Option, expected, seconds
 from ..core.text import block
 from ..core.words import in_one_line
 from ..report.provenance import installed

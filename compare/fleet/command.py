@@ -13,11 +13,14 @@ from typing import TYPE_CHECKING
 from tmt.compiled.cores import cores
 
 from ..cli import command_line as cli
-from ..cli.command_line import FLEET, Option
+from ..cli.command_line import FLEET
+from ..core import options as kinds
 from ..core.errors import Refused
+from ..core.options import Option
 from ..core.text import block
 from ..core.words import in_one_line
 from ..experiments import EXPERIMENTS, TIMED
+from ..experiments.options import stated_reference
 from ..process.streams import PROGRAM
 from ..report.terminal import Terminal
 
@@ -29,7 +32,7 @@ def fleet_reference(text: str) -> str:
     if ":" in text:
         why = f"{text!r} is not a reference of a fleet; expected arm, model or FILE.xml"
         raise argparse.ArgumentTypeError(why)
-    return cli.stated_reference(text)
+    return stated_reference(text)
 
 
 FLEET_OPTIONS = {
@@ -37,15 +40,15 @@ FLEET_OPTIONS = {
     "--full": Option(None),
     "--reference": Option(fleet_reference, "WHAT"),
     "--only": Option(metavar="LIST"),
-    "--workers": Option(cli.process_count, "N"),
+    "--workers": Option(kinds.process_count, "N"),
     "--dask": Option(metavar="ADDRESS"),
-    "--limit": Option(cli.seconds(1e6), "S", 1800.0),
+    "--limit": Option(kinds.seconds(1e6), "S", 1800.0),
 }
 
 
 def fleet_parser() -> cli.Parser:
     made = cli.command_parser(FLEET, "PATH...", FLEET, FLEET_OPTIONS)
-    made.add_argument("paths", nargs="*", type=cli.not_empty, metavar="PATH", help=argparse.SUPPRESS)
+    made.add_argument("paths", nargs="*", type=kinds.not_empty, metavar="PATH", help=argparse.SUPPRESS)
     return made
 
 
@@ -59,7 +62,7 @@ def experiments_of(made: cli.Parser, only: str | None) -> tuple[str, ...]:
         if name in TIMED:
             made.error(f"--only: {name} measures times, which a fleet does not: {PROGRAM} {name}")
         if name not in able:
-            near = cli.expected(name, able, ", ".join(able))
+            near = kinds.expected(name, able, ", ".join(able))
             made.error(f"--only: {name!r} is not an experiment; {near}")
     return tuple(name for name in able if name in names)
 

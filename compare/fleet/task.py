@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from ..core.text import block
 from ..engines.mujoco import ModelError, read
+from ..experiments.options import Options
 from ..report import folder, provenance
 from ..report.terminal import Terminal
 from ..robots.case import SEED
@@ -54,7 +55,7 @@ def compare_file(shown: str, path: str, place: str, options: FleetOptions) -> Fi
     if not names:
         row.reason = block("fleet", "nothing_applies", reasons=reasons)
         return row
-    setup = experiment.setup_of(compared, options.is_quick)
+    setup = experiment.setup_of(compared, Options(quick=options.is_quick))
     with folder.new_report(place) as out, ThreadPoolExecutor(1) as workers:
         examined = experiment.Run(names, setup, out, Terminal(), workers).examined()
         origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)

@@ -1,6 +1,5 @@
-"""One comparison of the command line: compute, draw, write the report, print the verdict."""
+"""One comparison of the command line: compute, draw, write the report, print the answer."""
 
-import argparse
 import importlib
 import json
 import os
@@ -19,11 +18,13 @@ from ..core.text import block, say
 from ..engines.mujoco import ModelError
 from ..engines.own import OwnError
 from ..experiments import EXPERIMENTS, skipped
+from ..experiments.options import Options
 from ..process import interrupt
 from ..process.streams import Stream
 from ..process.workers import WorkerEnded, start_workers
 from ..report.folder import UNCHANGED, exchange, has_report, new_report
 from ..report.terminal import Terminal
+from ..report.verdict import Report, failures
 from ..robots import Robot
 from ..robots.case import SEED
 from ..robots.scene_file import SceneError, read_scenes
@@ -31,49 +32,48 @@ from ..robots.states import MOST_SPEEDS
 from .reference import Compared, compared_with
 
 if TYPE_CHECKING:  # they take long to load
-    from ..report.verdict import Report
     from .examine import Examined, Run
 
 # modules that take long to load
 DRAWING, COMPUTING = "compare.report.style", "tmt.compiled.machine"
 INTERRUPTED = "interrupted"  # folder in that of an earlier report
+MOST_FAILING = 3  # checks on the first screen of one experiment
 
 
-def carry_out(options: argparse.Namespace, command: str) -> int:
+def carry_out(experiment: str, options: Options, command: str) -> int:
     """Compare the models and write the report; the exit status. Refused: that is not possible."""
-    started, terminal, is_alone = time.perf_counter(), Terminal(options.json), options.experiment != "all"
+    started, terminal, is_alone = time.perf_counter(), Terminal(options.json), experiment != "all"
     given, path = options.mjcf or "", os.path.abspath(options.mjcf) if options.mjcf else None
     out = Path(options.out).absolute()  # a user's own code may change the current folder
-    for name in ("scenes", "controls", "write"):
-        value = getattr(options, name)
-        setattr(options, name, value and os.path.abspath(value))
+    options = options.absolute()
     try:
-        asked = options.reference, path, options.joints, given or None
+        asked = options.reference, path, options.get("joints"), given or None
         compared = compared_with(*asked, floating=options.floating)
-        if options.scenes:
-            scenes = read_scenes(options.scenes, compared.robot)
-            compared = compared._replace(robot=compared.robot.with_scenes(scenes))
-        if is_alone and (reason := skipped(options.experiment, compared.robot, options.engines)):
-            about = {"experiment": options.experiment, "robot": compared.robot.name, "reason": say(reason)}
+        if scenes := options.get("scenes"):
+            robot = compared.robot.with_scenes(read_scenes(scenes, compared.robot))
+            compared = compared._replace(robot=robot)
+        if is_alone and (reason := skipped(experiment, compared.robot, options.get("engines"))):
+            about = {"experiment": experiment, "robot": compared.robot.name, "reason": say(reason)}
             raise Refused(block("run", "does_not_apply", **about))
+        options = options.validated(compared.reading, compared.robot.name)
+        names = [experiment] if is_alone else [*EXPERIMENTS]
         with new_report(out, options.out) as folder:
-            report = compute(options, command, compared, folder, terminal)
+            report, examined = compute(names, options, command, compared, folder, terminal)
     except WorkerEnded as error:
         raise Refused(f"{error}; {interrupt.Now.outcome}") from None
     except (ModelError, OwnError, SceneError) as error:
         raise Refused(str(error).replace(str(path), given)) from None
     page, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
-    outcome, answer = report.verdict.split("\n"), report.answer if is_alone else []
-    parts = (answer, outcome) if report.answers_first else (outcome, answer)
+    lines = first_screen(report, examined, is_alone)
     terminal.say()
-    terminal.say_lines(
-        [line for part in parts for line in part], "bold green" if report.passed else "bold red"
-    )
+    terminal.say_lines(lines, "bold green" if report.passed else "bold red")
+    for line in compared.reference.notes(is_alone and EXPERIMENTS[experiment].runs_file):
+        terminal.say(line)
     terminal.say(block("run", "report", path=page, seconds=seconds))
     if options.json:
         printed = {
             "passed": report.passed,
-            "verdict": outcome,
+            "verdict": report.verdict.split("\n"),
             "answer": report.answer,
             "causes": [cause.record() for cause in report.causes],
             "report": page,
@@ -84,24 +84,42 @@ def carry_out(options: argparse.Namespace, command: str) -> int:
     return 0 if report.passed else 1
 
 
+def first_screen(report: Report, examined: "Examined", is_alone: bool) -> list[str]:
+    """The last lines of a run: the answer to its question, else the verdict and what explains it; what else fails."""
+    from .examine import lines_of
+
+    failing = failures(report.sections)
+    verdict = report.verdict.split("\n")[: 2 if failing.unstable else 1]
+    if report.causes and failing.differing:  # what is not judged or confirmed follows from it
+        failing = failing._replace(not_judged=[], unconfirmed=[])
+    others = block("verdict", "others", failing=failing).splitlines()
+    mended = [block("run", "mended", states=examined.mended)] if examined.mended else []
+    if not is_alone:
+        return [*verdict, *mended, *others]
+    if report.answers_first:
+        return [*report.answer, *(verdict[-1:] if failing.differing or failing.broke else []), *others]
+    causes = [line for cause in report.causes for line in lines_of(cause)]
+    checks = [f"  {check}" for check in failing.differing[:MOST_FAILING]] if not causes else []
+    answer = report.answer if not causes or report.sections[0].record.compares else []
+    return [*verdict, *causes, *checks, *mended, *answer, *others]
+
+
 def compute(
-    options: argparse.Namespace, command: str, compared: Compared, folder: Path, terminal: Terminal
-) -> "Report":
+    names: Sequence[str], options: Options, command: str, compared: Compared, folder: Path, terminal: Terminal
+) -> "tuple[Report, Examined]":
     """Run the experiments and write the report to a folder; see write_report."""
-    is_alone, robot, started = options.experiment != "all", compared.robot, time.perf_counter()
-    request = compared.request_of(options)
-    answers = is_alone and EXPERIMENTS[options.experiment].first_screen  # a question about the file as it is
-    terminal.say_lines(compared.reference.warned if answers else compared.reference.lines)
-    if robot.coordinates.nv > MOST_SPEEDS:
+    is_alone, robot, started = len(names) == 1, compared.robot, time.perf_counter()
+    if robot.coordinates.nv > MOST_SPEEDS and not is_alone:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
-    names, reasons = applying([options.experiment] if is_alone else [*EXPERIMENTS], robot, options.engines)
+    names, reasons = applying(names, robot, options.get("engines"))
     run: Run | None = None
 
-    def written(is_complete: bool = True) -> "Report":
+    def written(is_complete: bool = True) -> "tuple[Report, Examined]":
         assert run is not None
         found = run.examined() if is_complete else run.finished()
         times = {"seconds": round(time.perf_counter() - started, 1)} | durations(run.clock)
-        return write_report(folder, found, reasons, origin | times, compared, names * (not is_complete))
+        written_by = origin | times, compared, [] if is_complete else names
+        return write_report(folder, found, reasons, *written_by), found
 
     def write_finished() -> None:
         """After an interrupt: the experiments that are finished, beside an earlier report."""
@@ -123,14 +141,13 @@ def compute(
 
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
         of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
-        of_run["tell"] = terminal.say
-        of_run |= {"alone": is_alone, "request": request, "command": command}
-        setup = examine.setup_of(compared, options.quick, options.engines, **of_run)
-        for name, reason in reasons.items():
-            terminal.say(block("run", "skipped", name=name, reason=reason))
+        setup = examine.setup_of(compared, options, alone=is_alone, command=command, **of_run)
         terminal.how_far = partial(examine.progress, workers.clock, names)
         run = examine.Run(names, setup, folder, terminal, workers, workers.clock)
-        return written()
+        report, examined = written()
+        if left_out := reasons | {name: why for name, why in examined.needless.items() if name != "diagnosis"}:
+            terminal.say(block("run", "left_out", reasons=left_out, own=robot.own))
+        return report, examined
 
 
 def applying(
@@ -144,18 +161,17 @@ def applying(
 def write_report(
     folder: Path, examined: "Examined", reasons: dict[str, str], origin: dict[str, Any], compared: Compared,
     interrupted: Sequence[str] = (),
-) -> "Report":  # fmt: skip
+) -> Report:  # fmt: skip
     """Write a report with its verdict to a folder that has its figures.
 
     interrupted: the names of all experiments of a run that was ended, of which some are finished.
     """
     from ..report import files, verdict
 
-    sections, causes, needless = examined
+    sections, causes, needless, _ = examined
     reference, robot, *_ = compared
     count = len(interrupted or EXPERIMENTS) - len(needless)
-    subject = block("run", "subject", kind=reference.kind)
-    words = verdict.verdict(sections, count, causes, subject, robot.name)
+    words = verdict.verdict(sections, count, causes, reference.subject, robot.name)
     left_out = reasons | needless
     if interrupted:
         names = [section.name for section in sections]
@@ -165,6 +181,6 @@ def write_report(
     named = {"kind": reference.kind, "name": reference.name}
     plain = compared.mujoco.plain(robot.case())
     about = words, causes, list(left_out.items()), named, reference.lines, plain, not interrupted
-    report = verdict.Report(sections, robot, origin, *about)
+    report = Report(sections, robot, origin, *about)
     files.write(folder, report)
     return report

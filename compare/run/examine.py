@@ -15,6 +15,7 @@ from ..core.text import block, say
 from ..engines import RECORDS
 from ..engines.own import Problem
 from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
+from ..experiments.options import Options, asked_alone
 from ..experiments.setup import Setup, engines
 from ..process import interrupt
 from ..process.workers import Clock, Current, WorkerEnded, Workers, give_back_memory
@@ -27,26 +28,26 @@ from .reference import Compared
 
 Value = TypeVar("Value")
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
-DIAGNOSED = tuple(name for name, record in EXPERIMENTS.items() if record.diagnosed)
 # the numbers on which Mbar and h depend, by their names in `parameters`
 OF_JOINTS, OF_BODIES = ("order", "parent", "ref", "axis", "anchor"), ("com", "mass", "inertia")
+SHOWN = 3  # causes on the terminal
 IN_EQUATIONS = (*OF_JOINTS, *OF_BODIES, "gravity", "armature", "flag gravity")
-SHOWN = 5  # lines on the terminal about an experiment that fails
 
 
 class Examined(NamedTuple):
     sections: list[Section]  # of each experiment, in the order of their names
     causes: list[Cause]  # of failing checks
     needless: dict[str, str]  # experiments that were skipped, and why
+    mended: int = 0  # states at which M and h agree without the causes; 0: that is not known
 
 
-def setup_of(compared: Compared, is_quick: bool, chosen: str | None = None, **more: Any) -> Setup:
-    """What the experiments need. chosen: the engines of --engines; more: further fields of Setup."""
-    make = Setup.quick if is_quick else Setup
+def setup_of(compared: Compared, options: Options, **more: Any) -> Setup:
+    """What the experiments need. more: further fields of Setup."""
+    make, chosen = Setup.quick if options.quick else Setup, options.get("engines")
     others = not_chosen(chosen) if chosen else set()
     of_run = engines(compared.mujoco, compared.reference.own)
     of_run = {name: engine for name, engine in of_run.items() if name not in others}
-    return make(compared.robot, of_run, reading=compared.reading, **more)
+    return make(compared.robot, of_run, reading=compared.reading, options=options, **more)
 
 
 def not_chosen(chosen: str) -> set[str]:
@@ -63,7 +64,8 @@ class Run:
     """The experiments of one run. clock: of the workers, it measures each experiment.
 
     An experiment that raises is one failed check; the others go on. The diagnosis runs, among others, only if
-    one of them fails.
+    one of them fails. Of several each has a line on the terminal; from the first that differs on they wait for
+    the causes.
     """
 
     names: Sequence[str]
@@ -77,6 +79,7 @@ class Run:
     work: dict[str, Any] = field(default_factory=dict)  # that was begun, of each experiment
     crashed: dict[str, Result] = field(default_factory=dict)
     told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
+    unsaid: list[Section] = field(default_factory=list)  # whose lines wait
     drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -98,13 +101,14 @@ class Run:
             reason = self.needless(name)
             if reason:
                 needless[name] = reason
-                self.terminal.say(block("run", "skipped", name=name, reason=reason))
                 self.clock.ends(name)
             else:
                 self.examine(name)
+        self.causes, mended = causes(self.setup, self.sections)
+        self.say_outcomes()
         self.finish_drawings()
         sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
-        return Examined(sections, self.causes, needless)
+        return Examined(sections, self.causes, needless, mended)
 
     def finished(self) -> Examined:
         """What is finished after an interrupt, without the figures that were not drawn."""
@@ -128,18 +132,14 @@ class Run:
 
     def needless(self, name: str) -> str:
         """Why an experiment is left out of a run of several; "" if it is not."""
-        differing = (section for section in self.sections if failures([section]).differing)
-        is_needed = any(section.name in DIAGNOSED for section in differing)
-        if len(self.names) > 1 and not EXPERIMENTS[name].compares and not is_needed:
-            return block("run", "nothing_failed")
-        return self.too_long(name)
+        is_needed = EXPERIMENTS[name].compares or len(self.names) == 1 or failures(self.sections).differing
+        return self.too_long(name) if is_needed else block("run", "nothing_failed")
 
     def too_long(self, name: str) -> str:
         """Why an experiment is left out of a quick run of several; "" if it is not."""
         most, robot = EXPERIMENTS[name].quick_speeds, self.setup.robot
-        fields = [option.removeprefix("--").replace("-", "_") for option in EXPERIMENTS[name].options]
-        is_asked = any(getattr(self.setup.request, field, None) for field in fields)
         is_small = most is None or robot.coordinates.nv <= most
+        is_asked = asked_alone(name, self.setup.options)
         if is_small or is_asked or self.setup.alone or not self.setup.is_quick:
             return ""
         return block("run", "not_quick", name=name, most=most)
@@ -153,16 +153,30 @@ class Run:
             self.sections.append(section)
             if self.setup.own:
                 add_problems(section.result, self.setup.own.equations.problems, self.told)
-            new = new_causes(self.setup, self.sections, self.causes)
-            self.causes = new + self.causes
         self.clock.ends(name)
         interrupt.tell("keeps")  # this, if the run is ended
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
-        say_outcome(self.terminal, section, self.clock.seconds_of(name), new, bool(self.causes))
-        if len(self.names) > 1:  # else they are the last lines of the run
-            for text in section.result.top:
-                self.terminal.say(f"  {say(text)}")
+        self.unsaid.append(section)
+        if not failures(self.sections).differing:
+            self.say_outcomes()
+
+    def say_outcomes(self) -> None:
+        """The lines of experiments of a run of several; the causes beneath the first that differs, else its first check."""
+        waiting, self.unsaid = self.unsaid, []
+        is_said = len(self.names) == 1
+        for section in [] if is_said else waiting:
+            failing = failures([section])
+            about = {"checks": len(section.result.checks), "failed": len(section.failed), "failing": failing}
+            style = "red" if section.failed else "yellow" if failing.not_judged else ""
+            seconds = self.clock.seconds_of(section.name)
+            self.terminal.say(block("run", "outcome", name=section.name, seconds=seconds, **about), style)
+            if failing.differing and not is_said:
+                lines = [line for cause in self.causes[:SHOWN] for line in lines_of(cause)]
+                if len(self.causes) > SHOWN:
+                    lines.append(f"  {block('run', 'more', count=len(self.causes) - SHOWN)}")
+                self.terminal.say_lines(lines or [f"  first: {failing.differing[0]}"])
+                is_said = True
 
     def section_of(self, name: str) -> Section:
         """The section of an experiment, which is run for it; of one that raises with the error alone."""
@@ -195,7 +209,6 @@ class Run:
                     raise
                 except Exception as error:
                     add_crash(section.result, "figures are drawn", error)
-                    self.terminal.say(f"  FAIL {section.result.checks[-1]}", "red")
         self.clock.ends(END)
 
 
@@ -225,39 +238,38 @@ def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) ->
     result.checks += others
 
 
-def new_causes(setup: Setup, sections: Sequence[Section], known: Sequence[Cause]) -> list[Cause]:
-    """The causes of the failures in the last section, if it is the first that fails, or of DIAGNOSED.
+def lines_of(cause: Cause) -> list[str]:
+    """A cause on the terminal; others that explain the same, a line each."""
+    first, *others = cause.text.split("; or ")
+    return [f"  CAUSE {first}", *(f"     or {other}" for other in others)]
 
-    Where numbers are stated, they are the numbers that differ, or what explains several of them at once. Else
-    they are also what the diagnosis finds at other places than the known ones.
+
+def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]:
+    """What explains that experiments differ, searched for once; the states at which M and h agree without it, 0: not known.
+
+    Where numbers are stated they are those that differ; one convention, number or slip that explains those in M
+    and h stands in their place. Else they are what the search finds, and the numbers at other places.
     """
-    failed = [section.name for section in sections if failures([section]).differing]
-    if not failed or failed[-1] != sections[-1].name:
-        return []
-    of_numbers: list[Cause] = []
-    if len(failed) == 1 and not setup.robot.own:
-        result, _ = attempt("parameters", setup, functions("parameters").rows, setup)
-        of_numbers = result.causes if result else []
-    if (known or of_numbers) and setup.robot.is_stated:
-        return in_one(setup, of_numbers)
-    is_first = failed[-1] in DIAGNOSED and not any(name in DIAGNOSED for name in failed[:-1])
-    if not (not known if failed[-1] == "diagnosis" else is_first):
-        return of_numbers
-    places = [cause.place for cause in known]
+    if not failures(sections).differing:
+        return [], 0
+    numbers = list[Cause]()
+    if not setup.robot.own:
+        of_numbers = next((section.result for section in sections if section.name == "parameters"), None)
+        of_numbers = of_numbers or attempt("parameters", setup, functions("parameters").rows, setup)[0]
+        numbers = of_numbers.causes if of_numbers else []
+    others = [cause for cause in numbers if cause.quantity not in IN_EQUATIONS]
+    if setup.robot.is_stated and numbers and len(numbers) < len(others) + 2:
+        return numbers, 0
     found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
-    causes = [cause for cause in found.causes if cause.place not in places] if found else []
-    return causes + of_numbers
-
-
-def in_one(setup: Setup, of_numbers: list[Cause]) -> list[Cause]:
-    """The causes; one option, convention, number or error of two replaces the numbers that it explains."""
-    replaced = [cause for cause in of_numbers if cause.quantity in IN_EQUATIONS]
-    if len(replaced) < 2:
-        return of_numbers
-    found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
-    explaining = [cause for cause in found.diagnosis.causes if cause.rank < 3] if found else []
-    others = [cause for cause in of_numbers if cause not in replaced]
-    return [explaining[0], *others] if explaining else of_numbers
+    if found is None:
+        return numbers, 0
+    is_explained = bool(found.diagnosis.causes)
+    if setup.robot.is_stated and numbers:
+        is_one = is_explained and found.diagnosis.causes[0].rank < 3
+        return ([found.said[0], *others], 0) if is_one else (numbers, 0)
+    places = [cause.place for cause in numbers]
+    searched = [cause for cause in found.said if cause.place not in places]
+    return searched + numbers, found.states * is_explained
 
 
 def attempt(
@@ -277,26 +289,6 @@ def attempt(
 
 def add_crash(result: Result, quantity: str, error: Exception) -> None:
     result.check("", quantity, None, 0.0, "", described(error), rule="equal", about=About.PROGRAM)
-
-
-def say_outcome(
-    terminal: Terminal, section: Section, seconds: float, new: Sequence[Cause], known: bool = False
-) -> None:
-    """A line for an experiment, then new causes, and the first failing checks: one where a cause is known."""
-    used = [check.over_tolerance or 0.0 for check in section.result.checks]
-    not_judged = failures([section]).not_judged
-    about = {"is_open": bool(not_judged), "share": max(used, default=0.0), "seconds": seconds}
-    style = "red" if section.failed else "yellow" if not_judged else ""
-    terminal.say(block("run", "outcome", section=section, **about), style)
-    lines = [f"CAUSE {cause.text}" for cause in new]
-    most = len(lines) + 1 if known else SHOWN
-    if not (known and section.record.states_causes):  # there the causes are the checks
-        lines += [f"FAIL {check}" for check in section.failed]
-    lines += map(str, not_judged)
-    if len(lines) > most + 1:
-        lines[most:] = [block("run", "more", count=len(lines) - most)]
-    for line in lines:
-        terminal.say(f"  {line}", "red")
 
 
 def progress(clock: Clock, names: Sequence[str]) -> list[str]:

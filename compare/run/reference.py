@@ -1,6 +1,5 @@
 """The reference of a file: the arm's numbers, a solution's, tmt's equations for the model, a user's own."""
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,24 +12,18 @@ from ..core.text import block, say
 from ..core.words import in_one_line
 from ..engines import Engine
 from ..engines.mujoco import ModelError, Mujoco, Reading, Source, engine, has_hinges, parse, read
-from ..engines.mujoco.names import integrator_by_name
-from ..engines.mujoco.parameters import of_source, of_welded, remarks
+from ..engines.mujoco.parameters import closed_loop, of_source, of_welded, remarks
 from ..engines.own import Own, OwnEquations, OwnError
 from ..engines.own.own_file import aside, own_object, raised_in
-from ..experiments.setup import Request
-from ..process.files import assets_of, why_not
-from ..report.folder import OWN
+from ..experiments.options import SOLUTIONS
 from ..robots import Robot
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import not_compared, robot_of, robot_of_solution
 from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
 from ..robots.placement import placed
-from ..robots.scene_file import read_controls
-from ..stability.motion import posture_of
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
-WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
 SOLUTION = "solution"  # the kind of reference that is another file
 
 
@@ -51,10 +44,24 @@ class Reference(NamedTuple):
     own: Own | None = None  # the engine of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
     otherwise: tuple[str, ...] = ()  # modelled in another way, with the same motion, a line each
+    to_know: tuple[str, ...] = ()  # of the first screen: what is fixed, or cannot be read
+    loop: str = ""  # of the first screen of a comparison: constraints that close it
 
     @property
     def name(self) -> str:
         return "arm" if self.kind == "arm" else self.source or self.file
+
+    @property
+    def subject(self) -> str:
+        """Both sides by their names."""
+        paths = self.file, self.source.removesuffix(":")
+        names = [Path(path).name for path in paths]
+        file, other = names if names[0] != names[1] else paths
+        return block("run", "subject", kind=self.kind, file=file, other=other)
+
+    def notes(self, runs_file: bool) -> tuple[str, ...]:
+        """What a user must know beside the answer. runs_file: it is about the file as it is."""
+        return self.to_know if runs_file or not self.loop else (*self.to_know, self.loop)
 
     @property
     def matched(self) -> str:
@@ -66,11 +73,8 @@ class Reference(NamedTuple):
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
         first = f"reference: {self.kind}; {self.file} compared with {other}"
         lines = first, self.matched, *self.otherwise, *self.remarks
-        return *(in_one_line(line) for line in lines if line), *self.warned
-
-    @property
-    def warned(self) -> tuple[str, ...]:
-        return tuple(in_one_line(f"MuJoCo warns: {line}") for line in self.warnings)
+        warned = (f"MuJoCo warns: {line}" for line in self.warnings)
+        return tuple(in_one_line(line) for line in (*lines, *warned) if line)
 
 
 class Compared(NamedTuple):
@@ -78,50 +82,6 @@ class Compared(NamedTuple):
     robot: Robot
     mujoco: Mujoco
     reading: Reading | None  # None: the robot's numbers are stated
-
-    def request_of(self, options: argparse.Namespace) -> Request:
-        """What the options ask; ModelError, in one line, for what needs a file or is not of this one."""
-        asked = {name: getattr(options, name) for name in (*Request._fields[1:], "dt", "integrator")}
-        given = [f"--{name.replace('_', '-')}" for name, value in asked.items() if value is not None]
-        if given and self.reading is None:
-            need = f"{' and '.join(given)} {'needs' if len(given) == 1 else 'need'} a robot's file"
-            raise ModelError(f"{need}; the numbers of {self.robot.name} are stated")
-        dt, integrator = asked.pop("dt"), asked.pop("integrator")
-        if self.reading is None or not given:
-            return Request()
-        for name in ("delay", "kp", "kv"):
-            if asked[name] is not None and not asked["control_period"]:
-                raise ModelError(f"--{name} is of a program with a --control-period")
-        try:
-            name = integrator_by_name(integrator or self.reading.integrator)
-            if asked["posture"]:
-                posture_of(asked["posture"], self.reading)
-            if asked["points"]:
-                from ..engines.mujoco.smaller import spec_with_points  # imports are slow
-
-                spec_with_points(self.reading.source, asked["points"].split(","))
-        except ValueError as error:
-            raise ModelError(f"{' '.join(given)}: {error}") from None
-        period, of_step = asked["control_period"], self.reading.dt if dt is None else dt
-        if period and abs(period / of_step - max(1, round(period / of_step))) > WHOLE:
-            raise ModelError(f"--control-period {period:g} is no multiple of the step, {of_step:g} s")
-        if asked["controls"]:
-            names = self.reading.drive.names if self.reading.drive else ()
-            asked["controls"] = read_controls(asked["controls"], names, of_step)
-            if options.scenes:
-                raise ModelError("--controls and --scenes both say what the robot does")
-        if asked["write"] is not None:
-            from ..engines.mujoco.smaller import MARK  # imports are slow
-
-            other = [Source(Path(options.reference))] if is_solution(options.reference or "") else []
-            needed = [file for source in (self.reading.source, *other) for file in source.files]
-            path, reserved = Path(asked["write"]).absolute(), [Path(options.out, name) for name in OWN]
-            if why := why_not(path, needed, reserved, MARK):
-                about = {"path": asked["write"], "why": why, "assets": assets_of(path).name}
-                raise ModelError(block("run", "not_writable", **about))
-            asked["write"] = str(path)
-        step = (self.reading.dt if dt is None else dt, name) if dt or integrator else None
-        return Request(step, **asked)
 
 
 def compared_with(
@@ -145,15 +105,19 @@ def compared_with(
     robot, mujoco = robot_of(reading, shown), engine(reading)
     if asked in (None, "model"):
         return Compared(reference_of("model", reading, shown), robot, mujoco, reading)
-    own = own_engine(asked, robot, mujoco, joints)
+    reference = reference_of("own", reading, shown)
+    own = own_engine(asked, robot, mujoco, joints, reference.loop)
     robot = replace(robot, own=tuple(own.equations.functions))
-    reference = reference_of("own", reading, shown)._replace(source=in_one_line(asked), own=own)
+    reference = reference._replace(source=in_one_line(asked), own=own)
     return Compared(reference, robot, mujoco, reading)
 
 
 def reference_of(kind: str, reading: Reading, shown: str) -> Reference:
     """The reference of a file as compiled, with what is fixed, changed or switched off in it."""
-    return Reference(kind, shown, tuple(map(say, remarks(reading, has_scenes=True))), reading.warnings)
+    found, loop = remarks(reading, has_scenes=True), closed_loop(reading, Path(shown).name)
+    to_know = tuple(say(finding) for finding in found if finding.kind in ("fixed_base", "missing"))
+    about = {"to_know": to_know, "loop": say(loop) if loop else ""}
+    return Reference(kind, shown, tuple(map(say, found)), reading.warnings, **about)
 
 
 def with_solution(source: Source, shown: str, asked: str, solution: str) -> Compared:
@@ -195,7 +159,7 @@ def with_arm(source: Source, path: str | None, shown: str) -> Compared:
 
 
 def is_solution(reference: str) -> bool:
-    return reference.lower().endswith((".xml", ".mjcf", ".urdf"))
+    return reference.lower().endswith(SOLUTIONS)
 
 
 def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose: str) -> Matched:
@@ -211,7 +175,7 @@ def bodies_on(reading: Reading, names: Sequence[str]) -> Counter[str]:
     return Counter(names[joint] for joint in reading.tree.body_joint)
 
 
-def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
+def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None, loop: str = "") -> Own:
     """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once; or OwnError."""
     source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
@@ -223,5 +187,5 @@ def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None)
     except JointsError as error:
         raise OwnError(f"--joints: {error}") from None
     except OwnError as error:
-        raise OwnError(f"{reference.rstrip(':')}: {error}") from None
+        raise OwnError(f"{reference.rstrip(':')}: {error}{f'. {loop}' if loop else ''}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))

@@ -219,6 +219,12 @@ def remarks(reading: Reading, has_scenes: bool) -> list[Finding]:
     return findings
 
 
+def closed_loop(reading: Reading, name: str) -> Finding | None:
+    """That constraints of a file are not in the equations of its joints; None: it has none. name: of the file."""
+    names = [feature.names for feature in reading.features if feature.feature == "equality"]
+    return Finding("remarks", "closed_loop", {"model": name, "names": names[0]}) if names else None
+
+
 def of_welded(source: Source) -> list[Finding]:
     """Which bodies of a joined Source are one with another; links without mass, or with a negligible one."""
     model, findings = source.model, []

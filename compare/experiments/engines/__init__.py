@@ -26,7 +26,7 @@ from .features import feature_of_speeds
 from .readings import compare_numbers
 from .tables import AnswerRow, EngineRow, EnginesResult, ReadRow, RunRow
 
-EXPERIMENT = Experiment(order=65, serves_own=False, asks_others=True, quick_speeds=0, options=("--engines",),
+EXPERIMENT = Experiment(order=65, serves_own=False, runs_file=True, asks_others=True, quick_speeds=0,
                         first_screen=("answer",))  # fmt: skip
 COMPARED = ("Mbar", "bias", "qdd")
 MOST_SHOWN = 12  # speeds of a robot whose state stands in the note of a check
@@ -85,7 +85,7 @@ def add_answer(result: EnginesResult, setup: Setup, record: EngineRecord) -> Non
     cells = [say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")]
     row = AnswerRow(label, record.precision, *cells)
     result.tables["engines_answer"].append(row)
-    setup.tell(say(result.finding("engine", row=row)))
+    setup.progress(say(result.finding("engine", row=row)))
 
 
 def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None:

@@ -30,18 +30,13 @@ from ...robots.coordinates import Coordinates
 from ...stability.answer import joint_of
 from ...stability.push import Pushed
 from .. import Experiment
+from ..options import ReductionOptions
 from ..setup import Setup
 from .records import JointRow, ModelRow, UseRow
 from .scene import scene_of, scene_of_case
 from .search import TEXT, Locks, lockable, take_out, written
 
-EXPERIMENT = Experiment(
-    order=110,
-    serves_own=False,
-    first_screen=("answer", "needs"),
-    quick_speeds=8,
-    options=("--scenes", "--posture", "--error", "--points", "--controls", "--write"),
-)
+EXPERIMENT = Experiment(order=110, serves_own=False, runs_file=True, first_screen=("answer", "needs"), quick_speeds=8)
 ERROR = 1e-3  # rad or m, if none is asked for
 STATES = 5  # random ones, at which the locked models are compared
 ROUNDS = 6  # of timing
@@ -86,7 +81,8 @@ def add_scenes(result: Result, setup: Setup) -> None:
 
 def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     """Rows, checks and the answer of a motion of a file; the smaller file is written."""
-    allowed, write = setup.request.error or ERROR, setup.request.write
+    asked = setup.asked(ReductionOptions)
+    allowed, write = asked.error or ERROR, asked.write
     try:
         scene, motions = scene_of(setup, reading)
     except ValueError as reason:

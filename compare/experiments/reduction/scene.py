@@ -10,6 +10,7 @@ from ...engines.mujoco.source import Source
 from ...engines.mujoco.stepper import Stepper
 from ...robots.case import Case
 from ...stability.motion import Motion, motion_of, posture_of, postures_of
+from ..options import ReductionOptions
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe
@@ -17,8 +18,8 @@ DURATION = 1.0  # s, of the motion from a keyframe
 
 def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:
     """All of --scenes; else --controls, or what the file states, from a posture. ValueError: that cannot be."""
-    request = setup.request
-    points = tuple(request.points.split(",")) if request.points else ()
+    asked = setup.asked(ReductionOptions)
+    points = tuple(asked.points.split(",")) if asked.points else ()
     whole = Smaller.whole(reading.source, points)
     stepper = Stepper(whole.model, reading.dt, reading.integrator)
     cases = [case for case in setup.robot.cases if "user" in case.scene.tags]
@@ -28,8 +29,8 @@ def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:
     rolls = [roll_of(case, stepper) for case in cases]
     motions = [Motion(reading.model, roll.name, roll.state, "") for roll in rolls]
     if not rolls:
-        posture = posture_of(request.posture, reading) if request.posture else postures_of(reading)[0]
-        motion, controls = motion_of(reading, posture, request.controls), None
+        posture = posture_of(asked.posture, reading) if asked.posture else postures_of(reading)[0]
+        motion, controls = motion_of(reading, posture, asked.controls), None
         steps = max(1, round((motion.times[-1] if len(motion.times) else DURATION) / reading.dt))
         if len(motion.times):
             controls = np.vstack([np.array(part) for _, part in motion.parts(stepper, steps, 0.0, 0.0)])

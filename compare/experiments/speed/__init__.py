@@ -17,9 +17,7 @@ from . import conclusions, evaluations
 from .runs import FIRST_STEPS, RunRow, SceneRuns, SpeedResult, rows_of, scene_runs, take_times
 from .settings import followed, left_out, regular_of, scenes_of
 
-EXPERIMENT = Experiment(
-    order=90, serves_own=False, options=("--scenes", "--engines"), timed=True, overview="times"
-)
+EXPERIMENT = Experiment(order=90, serves_own=False, timed=True, overview="times")
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:

@@ -17,10 +17,8 @@ from .subjects import DAMPINGS, SCHEMES, coarsest_case, methods_of, subjects_of,
 from .tables import LimitRow, StabilityResult
 
 EXPERIMENT = Experiment(
-    order=100, serves_own=False, overview="limits", first_screen=("answer", "by_itself", "smaller", "remedies", "within"),
-    options=(
-        "--dt", "--integrator", "--posture", "--push", "--error", "--controls", "--control-period", "--delay", "--kp", "--kv",
-    ),
+    order=100, serves_own=False, runs_file=True, overview="limits",
+    first_screen=("answer", "by_itself", "smaller", "remedies", "within"),
 )  # fmt: skip
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
 

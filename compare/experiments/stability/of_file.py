@@ -10,6 +10,7 @@ from ...engines.mujoco.names import INTEGRATORS
 from ...engines.mujoco.reading import Reading
 from ...stability.answer import CREEPS, Answer, Question, StepLimitRow, answer
 from ...stability.motion import Posture, posture_of, postures_of
+from ..options import StabilityOptions
 from ..setup import Setup
 from .tables import StabilityResult
 
@@ -32,19 +33,19 @@ def begin(setup: Setup, reading: Reading) -> Work:
 
     A quick run has the file's integrator and Euler; one of several experiments the first posture alone.
     """
-    request = setup.request
-    postures = [posture_of(request.posture, reading)] if request.posture else postures_of(reading)
-    dt, own = request.step or (reading.dt, reading.integrator)
+    asked = setup.asked(StabilityOptions)
+    postures = [posture_of(asked.posture, reading)] if asked.posture else postures_of(reading)
+    dt, own = asked.dt or reading.dt, asked.integrator or reading.integrator
     names = [own, DEFAULT] if setup.is_quick else [own, *INTEGRATORS]
     question = Question(
-        dt, own, list(dict.fromkeys(names)), request.push, request.error, request.controls, request.control_period,
-        request.delay, request.kp, request.kv, drawn=setup.alone and not setup.is_quick, helped=True,
+        dt, own, list(dict.fromkeys(names)), asked.push, asked.error, asked.controls, asked.control_period,
+        asked.delay, asked.kp, asked.kv, drawn=setup.alone and not setup.is_quick, helped=True,
     )  # fmt: skip
     others = question._replace(integrators=[own], drawn=False, helped=False)
     tasks = [(posture, others if number else question) for number, posture in enumerate(postures)]
-    quantity = AT_PERIOD if request.control_period else AT_REQUESTED_STEP if request.step else AT_OWN_STEP
+    quantity = AT_PERIOD if asked.control_period else AT_REQUESTED_STEP if asked.dt else AT_OWN_STEP
     found = setup.map(partial(answer_of, reading=reading), tasks if setup.alone else tasks[:1])
-    return Work(quantity, found, setup.alone, request.error)
+    return Work(quantity, found, setup.alone, asked.error)
 
 
 def answer_of(task: tuple[Posture, Question], reading: Reading) -> Answer | str:
