@@ -16,7 +16,7 @@ from compare.cli import command_line
 from compare.core.check import Result
 from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.experiments.setup import Request
+from compare.experiments.options import Options
 from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
@@ -76,7 +76,7 @@ def test_what_raises_is_one_failed_check(tmp_path, capsys, monkeypatch):
     for check, (name, (_, quantity, error)) in zip(failed, BROKEN.items(), strict=True):
         expected = {"experiment": name, "quantity": quantity, "value": None, "rule": "equal"}
         assert check.items() >= expected.items()
-        assert error in check["note"] and f"FAIL {name}: {quantity}" in out
+        assert error in check["note"] and f"Not finished: {name}, " in out
 
 
 def test_a_report_that_cannot_be_made_is_one_line_and_the_earlier_one_is_whole(tmp_path, capsys, monkeypatch):
@@ -170,7 +170,7 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
     for name in names:
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
     setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
-    setup.request = Request()
+    setup.options = Options()
     sections, causes, skipped = experiment.Run(names, setup, tmp_path, Terminal(), Writing(log)).examined()
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),
@@ -184,7 +184,7 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
 
 def test_an_experiment_under_way_is_not_finished_although_it_has_rows(tmp_path):
     (tmp_path / "figures").mkdir()
-    setup = SimpleNamespace(own=None, robot=ARM, is_quick=False, alone=True, request=Request())
+    setup = SimpleNamespace(own=None, robot=ARM, is_quick=False, alone=True, options=Options())
     run = experiment.Run(["mass", "gravity"], setup, tmp_path, Terminal(), None, Clock())
     run.sections += [section("mass", GOOD), section("gravity", GOOD)]
     run.clock.ends("mass")

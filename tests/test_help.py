@@ -13,8 +13,10 @@ from runs import ENVIRONMENT
 from shown import blocks, command_lines
 
 from compare.__main__ import main
-from compare.cli.command_line import LINE_WIDTH, OPTIONS, command_parser, request
+from compare.cli.command_line import LINE_WIDTH, command_parser, request
+from compare.core.options import options_in
 from compare.experiments import EXPERIMENTS, skipped
+from compare.experiments.options import AllOptions, Options, StabilityOptions, options_of
 from compare.export.command import OPTIONS as OF_EQUATIONS
 from compare.fleet.command import experiments_of, fleet_parser
 from compare.report.provenance import OURS, installed
@@ -31,7 +33,10 @@ def com_positions(q):
 
 
 @pytest.mark.parametrize("arguments, expected", [
-    ([], EXPERIMENTS), (["all", "--help"], [f"  {name} " for name in (*EXPERIMENTS, *OPTIONS, "--version")]),
+    ([], [f"  {name} " for name in (*EXPERIMENTS, "all", "fleet", "equations", "--version")]),
+    (["all", "--help"], [f"  {word} " for word in (*options_in(Options), "--engines", "--write")]),
+    (["stability", "--help"], [f"  {word} " for word in options_in(StabilityOptions)]),
+    *((([name, "--help"], ["Examples:"])) for name in EXPERIMENTS if name not in ("diagnosis", "stability")),
 ])  # fmt: skip
 def test_help_has_every_experiment_and_option(arguments, expected, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
@@ -40,8 +45,16 @@ def test_help_has_every_experiment_and_option(arguments, expected, capsys, monke
     assert max(map(len, text.splitlines())) <= LINE_WIDTH
 
 
+def test_an_experiments_help_has_its_own_options_alone(capsys):
+    every = {word for name in EXPERIMENTS for word in options_in(options_of(name))}
+    for name in ("mass", "stability", "reduction", "all"):
+        _, text, _ = answered([name, "--help"], capsys)
+        shown = {word for word in every if f"  {word} " in text}
+        assert shown == {*options_in(AllOptions if name == "all" else options_of(name))}, name
+
+
 def test_the_version_is_that_of_a_report(capsys):
-    assert main(["all", "--version"]) == 0
+    assert main(["--version"]) == 0
     assert tuple(capsys.readouterr()) == (f"{OURS} {installed(OURS)}\n", "")
     assert re.fullmatch(r"\d+(\.\d+)+", installed(OURS))
 
@@ -69,7 +82,7 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
     elif "--help" in words or not words:
         assert answered(words, capsys)[0] == 0
     else:
-        assert request(words).experiment == words[0]
+        assert request(words)[0] == words[0]
 
 
 FILES_OF_ARM = ["my_arm.xml", "my_robot.xml", "solution.xml", "robot.urdf"]

@@ -9,7 +9,7 @@ from edited import XML, edited, setup_of
 from compare.experiments import parameters
 from compare.report.verdict import Section
 from compare.robots.arm import ARM
-from compare.run.examine import Setup, in_one, new_causes
+from compare.run.examine import Setup, causes
 
 ALPHA, BETA, GAMMA = (f'<joint name="{name}" type="hinge"' for name in ("alpha", "beta", "gamma"))
 FOREARM = '<inertial pos="0.15 0 0" mass="1.5" diaginertia="0.001 0.019 0.019"/>'
@@ -148,9 +148,9 @@ def test_numbers_that_are_wrong_together_are_one_cause(edits, text):
 def test_a_slip_that_explains_several_numbers_is_the_cause_in_their_place():
     upper_arm = '<inertial pos="0 0 -0.15" mass="1.9" diaginertia="0.015 0.014 0.002"/>'
     setup = setup_of(edited((upper_arm, "@"), (FOREARM, upper_arm), ("@", FOREARM)), states=20, make=Setup)
-    several = parameters.rows(setup).causes
-    (cause,) = in_one(setup, several)
-    assert len(several) == 3 and cause.place == "masses, CoMs and inertias of upper arm and forearm"
+    result = parameters.rows(setup)
+    ((cause,), _) = causes(setup, [Section("parameters", "", "", "", result)])
+    assert len(result.causes) == 3 and cause.place == "masses, CoMs and inertias of upper arm and forearm"
 
 
 def test_what_is_wrong_for_another_reason_stays_another_cause():
@@ -163,12 +163,12 @@ def test_what_is_wrong_for_another_reason_stays_another_cause():
     assert len(places(edited((FOREARM, no_body)))) == 3
 
 
-@pytest.mark.parametrize("edits, causes", [
+@pytest.mark.parametrize("edits, places", [
     # 90 degrees where radians are meant
     ([(BODY, f'{BODY} euler="0 90 0"'), (GAMMA, f'{GAMMA} damping="0.1"')], ["zero of gamma", "damping of gamma"]),
     ([(BETA, f'{BETA} pos="0.01 0 0"')], ["anchor x of beta", "com x of upper arm"]),
 ])  # fmt: skip
-def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, causes):
+def test_one_convention_or_slip_stands_for_the_numbers_that_follow_from_it(edits, places):
     setup = setup_of(edited(*edits), make=Setup, states=20)
     sections = [Section("parameters", "", "", "", parameters.rows(setup))]
-    assert [cause.place for cause in new_causes(setup, sections, [])] == causes
+    assert [cause.place for cause in causes(setup, sections)[0]] == places

@@ -2,6 +2,7 @@
 
 import argparse
 import shlex
+import sys
 from collections.abc import Sequence
 from textwrap import fill
 from typing import Any, NoReturn
@@ -11,7 +12,7 @@ from ..core.text import block
 from ..core.words import in_one_line
 from ..experiments import EXPERIMENTS
 from ..experiments.options import Options, options_of
-from ..process.streams import PROGRAM
+from ..process.streams import PROGRAM, Stream
 
 FLEET, EQUATIONS, ALL = "fleet", "equations", "all"
 LINE_WIDTH = 80
@@ -47,8 +48,7 @@ class Parser(argparse.ArgumentParser):
 
 def parser(command: str) -> Parser:
     """The parser of an experiment or of `all`, with the options that it takes and no others."""
-    text = block(TEXT, "help_of_all") if command == ALL else help_of(command)
-    made = Parser(prog=PROGRAM, usage=f"{PROGRAM} {command} [options]", description=text)
+    made = Parser(prog=PROGRAM, usage=f"{PROGRAM} {command} [options]")
     made.add_argument("-h", "--help", action="store_true", help=block(TEXT, "help"))
     for word, option in options_in(options_of(command)).items():
         made.add_option(word, option, TEXT)
@@ -69,7 +69,10 @@ def help_of(experiment: str) -> str:
     record, summary = EXPERIMENTS[experiment], fill(block(experiment, "summary"), LINE_WIDTH - 1)
     examples = [" --mjcf my_arm.xml" if record.needs_file else ""]
     examples += [option.example for option in options_in(options_of(experiment)).values() if option.example]
-    text = block(experiment, "help")
+    paragraphs = block(experiment, "help").split("\n\n")
+    text = "\n\n".join(
+        text if text.lstrip("\n").startswith("    ") else fill(text, LINE_WIDTH) for text in paragraphs
+    )
     return block(TEXT, "experiment", name=experiment, summary=summary, text=text, examples=examples)
 
 
@@ -86,7 +89,7 @@ def request(arguments: Sequence[str]) -> tuple[str, Options]:
     """The experiment, or all, and its options. SystemExit: with 0 after help, with 2 and one line for what is mistyped."""
     words = list(arguments) or ["--help"]
     if words[0] in ("-h", "--help"):
-        print(help_of_all_commands())
+        print(help_of_all_commands(), file=Stream(sys.stdout), flush=True)
         raise SystemExit(0)
     command, *words = words
     if command != ALL and command not in EXPERIMENTS:
@@ -99,6 +102,7 @@ def request(arguments: Sequence[str]) -> tuple[str, Options]:
     values, unknown = made.parse_known_args(words)
     refuse_words(made, command, unknown)
     if values.help:
+        made.description = block(TEXT, "help_of_all") if command == ALL else help_of(command)
         made.print_help()
         raise SystemExit(0)
     del values.help

@@ -60,7 +60,9 @@ def option(kind: Callable[[str], Any] | None = not_empty, metavar: str | None = 
 
 def options_in(kind: type) -> dict[str, Option]:
     """The options of a dataclass by their words: --control-period of control_period."""
-    return {f"--{field.name.replace('_', '-')}": field.metadata["option"] for field in dataclasses.fields(kind)}
+    return {
+        f"--{field.name.replace('_', '-')}": field.metadata["option"] for field in dataclasses.fields(kind)
+    }
 
 
 def name_of(word: str) -> str:

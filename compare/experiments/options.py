@@ -122,7 +122,9 @@ class MotionOptions(Options):
     """Of what a robot does: posture: a name, or numbers with commas; controls: by names of actuators, and times."""
 
     posture: str | None = option(metavar="NAME|NUMBERS", of_file=True)
-    controls: Mapping[str, Any] | str | None = option(metavar="CSV", of_file=True, example=f"{ROBOT} --controls recorded.csv")
+    controls: Mapping[str, Any] | str | None = option(
+        metavar="CSV", of_file=True, example=f"{ROBOT} --controls recorded.csv"
+    )
 
     def validated(self, reading: "Reading | None", name: str, dt: float | None = None) -> Self:
         """As Options.validated, with the controls that are recorded. dt: s, the step that is asked for."""
@@ -157,7 +159,7 @@ class StabilityOptions(MotionOptions):
     push: float | None = option(number("push in rad/s or m/s", 1e-9, 1e3), "P", of_file=True)
     error: float | None = option(number("error", 1e-12, 1.0), "E", of_file=True, text="apart")
     control_period: float | None = option(
-        seconds(1.0), "S", of_file=True, example=f"{ROBOT} --control-period 0.02 --delay 0.004"
+        seconds(1.0), "S", of_file=True, example=f"{ROBOT} --control-period 0.02"
     )
     delay: float | None = option(number("time in s", 0.0, 1.0), "S", of_file=True)
     kp: float | None = option(GAIN, "KP", of_file=True)

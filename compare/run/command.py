@@ -58,13 +58,13 @@ def carry_out(experiment: str, options: Options, command: str) -> int:
         options = options.validated(compared.reading, compared.robot.name)
         names = [experiment] if is_alone else [*EXPERIMENTS]
         with new_report(out, options.out) as folder:
-            report, examined = compute(names, options, command, compared, folder, terminal)
+            report, mended = compute(names, options, command, compared, folder, terminal)
     except WorkerEnded as error:
         raise Refused(f"{error}; {interrupt.Now.outcome}") from None
     except (ModelError, OwnError, SceneError) as error:
         raise Refused(str(error).replace(str(path), given)) from None
     page, seconds = os.path.join(options.out, "index.html"), time.perf_counter() - started
-    lines = first_screen(report, examined, is_alone)
+    lines = first_screen(report, mended, is_alone)
     terminal.say()
     terminal.say_lines(lines, "bold green" if report.passed else "bold red")
     for line in compared.reference.notes(is_alone and EXPERIMENTS[experiment].runs_file):
@@ -84,8 +84,11 @@ def carry_out(experiment: str, options: Options, command: str) -> int:
     return 0 if report.passed else 1
 
 
-def first_screen(report: Report, examined: "Examined", is_alone: bool) -> list[str]:
-    """The last lines of a run: the answer to its question, else the verdict and what explains it; what else fails."""
+def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
+    """The last lines of a run: the answer to its question, else the verdict and what explains it; what else fails.
+
+    states: at which M and h agree without the causes; 0: that is not known.
+    """
     from .examine import lines_of
 
     failing = failures(report.sections)
@@ -93,7 +96,7 @@ def first_screen(report: Report, examined: "Examined", is_alone: bool) -> list[s
     if report.causes and failing.differing:  # what is not judged or confirmed follows from it
         failing = failing._replace(not_judged=[], unconfirmed=[])
     others = block("verdict", "others", failing=failing).splitlines()
-    mended = [block("run", "mended", states=examined.mended)] if examined.mended else []
+    mended = [block("run", "mended", states=states)] if states else []
     if not is_alone:
         return [*verdict, *mended, *others]
     if report.answers_first:
@@ -106,20 +109,21 @@ def first_screen(report: Report, examined: "Examined", is_alone: bool) -> list[s
 
 def compute(
     names: Sequence[str], options: Options, command: str, compared: Compared, folder: Path, terminal: Terminal
-) -> "tuple[Report, Examined]":
-    """Run the experiments and write the report to a folder; see write_report."""
+) -> tuple[Report, int]:
+    """Run the experiments and write the report to a folder; see write_report, and Run.mended."""
     is_alone, robot, started = len(names) == 1, compared.robot, time.perf_counter()
     if robot.coordinates.nv > MOST_SPEEDS and not is_alone:
         terminal.say(say(Finding("shared", "large", {"speeds": robot.coordinates.nv, "most": MOST_SPEEDS})))
     names, reasons = applying(names, robot, options.get("engines"))
+    left_out = dict(reasons)
     run: Run | None = None
 
-    def written(is_complete: bool = True) -> "tuple[Report, Examined]":
+    def written(is_complete: bool = True) -> Report:
         assert run is not None
         found = run.examined() if is_complete else run.finished()
         times = {"seconds": round(time.perf_counter() - started, 1)} | durations(run.clock)
-        written_by = origin | times, compared, [] if is_complete else names
-        return write_report(folder, found, reasons, *written_by), found
+        left_out.update({name: why for name, why in found.needless.items() if name != "diagnosis"})
+        return write_report(folder, found, reasons, origin | times, compared, [] if is_complete else names)
 
     def write_finished() -> None:
         """After an interrupt: the experiments that are finished, beside an earlier report."""
@@ -144,10 +148,10 @@ def compute(
         setup = examine.setup_of(compared, options, alone=is_alone, command=command, **of_run)
         terminal.how_far = partial(examine.progress, workers.clock, names)
         run = examine.Run(names, setup, folder, terminal, workers, workers.clock)
-        report, examined = written()
-        if left_out := reasons | {name: why for name, why in examined.needless.items() if name != "diagnosis"}:
+        report = written()
+        if left_out:
             terminal.say(block("run", "left_out", reasons=left_out, own=robot.own))
-        return report, examined
+        return report, run.mended
 
 
 def applying(
@@ -168,7 +172,7 @@ def write_report(
     """
     from ..report import files, verdict
 
-    sections, causes, needless, _ = examined
+    sections, causes, needless = examined
     reference, robot, *_ = compared
     count = len(interrupted or EXPERIMENTS) - len(needless)
     words = verdict.verdict(sections, count, causes, reference.subject, robot.name)

@@ -38,7 +38,6 @@ class Examined(NamedTuple):
     sections: list[Section]  # of each experiment, in the order of their names
     causes: list[Cause]  # of failing checks
     needless: dict[str, str]  # experiments that were skipped, and why
-    mended: int = 0  # states at which M and h agree without the causes; 0: that is not known
 
 
 def setup_of(compared: Compared, options: Options, **more: Any) -> Setup:
@@ -80,6 +79,7 @@ class Run:
     crashed: dict[str, Result] = field(default_factory=dict)
     told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
     unsaid: list[Section] = field(default_factory=list)  # whose lines wait
+    mended: int = 0  # states at which M and h agree without the causes; 0: that is not known
     drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -104,11 +104,11 @@ class Run:
                 self.clock.ends(name)
             else:
                 self.examine(name)
-        self.causes, mended = causes(self.setup, self.sections)
+        self.causes, self.mended = causes(self.setup, self.sections)
         self.say_outcomes()
         self.finish_drawings()
         sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
-        return Examined(sections, self.causes, needless, mended)
+        return Examined(sections, self.causes, needless)
 
     def finished(self) -> Examined:
         """What is finished after an interrupt, without the figures that were not drawn."""
@@ -175,7 +175,8 @@ class Run:
                 lines = [line for cause in self.causes[:SHOWN] for line in lines_of(cause)]
                 if len(self.causes) > SHOWN:
                     lines.append(f"  {block('run', 'more', count=len(self.causes) - SHOWN)}")
-                self.terminal.say_lines(lines or [f"  first: {failing.differing[0]}"])
+                for line in lines or [f"  first: {failing.differing[0]}"]:
+                    self.terminal.say(line)
                 is_said = True
 
     def section_of(self, name: str) -> Section:

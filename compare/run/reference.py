@@ -116,8 +116,8 @@ def reference_of(kind: str, reading: Reading, shown: str) -> Reference:
     """The reference of a file as compiled, with what is fixed, changed or switched off in it."""
     found, loop = remarks(reading, has_scenes=True), closed_loop(reading, Path(shown).name)
     to_know = tuple(say(finding) for finding in found if finding.kind in ("fixed_base", "missing"))
-    about = {"to_know": to_know, "loop": say(loop) if loop else ""}
-    return Reference(kind, shown, tuple(map(say, found)), reading.warnings, **about)
+    reference = Reference(kind, shown, tuple(map(say, found)), reading.warnings, to_know=to_know)
+    return reference._replace(loop=say(loop) if loop else "")
 
 
 def with_solution(source: Source, shown: str, asked: str, solution: str) -> Compared:

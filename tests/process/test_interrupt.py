@@ -35,8 +35,8 @@ TESTS = Path(__file__).parents[1]
 ALL = command("all", "--quick", "--out", "report")
 OWN = [*ALL, "--reference", f"{TESTS / 'own_equations.py'}:", "--mjcf", "../double.xml"]
 ROLLING = [sys.executable, "-c", ROLLOUT]
-RUNS = {  # what runs, and what it is sent: as it begins, or after its first line
-    "workers start": (ALL, "SIGTERM"), "a line": (ALL, "SIGHUP"), "own equations": (OWN, "SIGINT"),
+RUNS = {  # what runs, and what it is sent: as it begins, after its first line, or when its folder is there
+    "workers start": (ALL, "SIGTERM"), "a folder": (ALL, "SIGHUP"), "own equations": (OWN, "SIGINT"),
     "a rollout": (ROLLING, "SIGINT"),
 }  # fmt: skip
 
@@ -50,6 +50,10 @@ def test_an_interrupt_is_answered_within_a_second(tmp_path, name):
         run = started(*what, cwd=place, env={"TMT_CACHE": str(tmp_path / "cache")})
         if name == "workers start":
             time.sleep(0.8)
+        elif what != ROLLING:
+            while not any(place.iterdir()):
+                time.sleep(0.02)
+            time.sleep(0.3)  # the folder is registered
         else:
             run.stdout.readline()
         assert run.poll() is None

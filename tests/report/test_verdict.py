@@ -5,13 +5,13 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
-from in_process import Lines
 from matplotlib.colors import to_hex
 from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.finding import Finding
+from compare.core.text import block
 from compare.experiments import module
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
@@ -24,10 +24,15 @@ from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE
 from compare.report.verdict import failures, headline, outcome, passed, standing, verdict
 from compare.robots.arm import ARM
-from compare.run.examine import say_outcome, section_with
+from compare.run.examine import lines_of, section_with
 
 CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
 OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.STEP)
+
+
+def line_of(section) -> str:
+    about = {"checks": len(section.result.checks), "failed": len(section.failed), "failing": failures([section])}
+    return block("run", "outcome", name=section.name, seconds=1.0, **about)
 
 
 def counts(*sections):
@@ -103,26 +108,24 @@ def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to
         assert not passed([one]) and standing(one)[0] is None and "agree" not in text and "differ" not in text
         assert "the tolerance exceeds every value" in text
         assert (passed_checks or "Nothing was compared") in text
-        said = Lines()
-        say_outcome(said, one, 1.0, [])
-        assert "NOT JUDGED" in said[0] and len(said) == 2
+        assert line_of(one).split()[1:3] == ["not", "judged"]
     failing = section("mass", GOOD, BAD)
     failing.result.not_judged("held", "qdd", "why")
     assert standing(failing) == (False, "1 of 2 fail") and "1 of 2 checks" in verdict([failing], 1)
 
 
-def test_the_terminal_says_what_comes_closest_and_names_the_first_that_fail():
-    said = Lines()
-    say_outcome(said, section("mass", GOOD, ("a", 0.25, 1.0, "at most", True)), 1.25, [])
-    assert len(said) == 1 and said[0].split()[:4] == ["mass", "ok", "2", "checks"] and " 50 %" in said[0]
-    of = section("mass", *[BAD] * 7, GOOD)
-    say_outcome(said, of, 1.0, [CAUSE])
-    assert said[1].split()[1:5] == ["7", "FAILED", "8", "checks"]
-    assert said[2] == "  CAUSE mass of forearm: stated 1"
-    assert [line.startswith("  FAIL mass: Mbar, zero: 2 kg m2") for line in said[3:]] == [True] * 4 + [False]
-    del said[:]
-    say_outcome(said, of, 1.0, [], True)  # the cause is known
-    assert [line.split()[0] for line in said[1:]] == ["FAIL", "and"]
+@pytest.mark.parametrize("checks, word, count", [
+    ([GOOD, GOOD], "ok", "2 checks"), ([BAD] * 7 + [GOOD], "differs", "7 of 8 checks fail"),
+    ([GOOD, OWN_STEP], "fails", "1 of 2 checks fails"),
+])  # fmt: skip
+def test_an_experiment_of_several_has_a_line(checks, word, count):
+    line = line_of(section("mass", *checks))
+    assert line.split()[:2] == ["mass", word] and count in line and line.endswith(" 1.0 s") and len(line) <= 80
+
+
+def test_what_explains_the_same_as_a_cause_has_a_line_beneath_it():
+    cause = replace(CAUSE, text="a: missing; or b: missing (no state can distinguish them)")
+    assert lines_of(cause) == ["  CAUSE a: missing", "     or b: missing (no state can distinguish them)"]
 
 
 def answer_of(*sections) -> dict:

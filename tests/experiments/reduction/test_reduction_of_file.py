@@ -16,10 +16,10 @@ from compare.engines.mujoco.reading import read
 from compare.engines.mujoco.smaller import FREE, Smaller, locked
 from compare.engines.mujoco.source import Source
 from compare.experiments import reduction
+from compare.experiments.options import ReductionOptions
 from compare.experiments.reduction import search
 from compare.experiments.reduction.scene import scene_of
 from compare.experiments.reduction.search import lockable, take_out
-from compare.experiments.setup import Request
 from compare.robots.scene_file import SceneError, read_controls, read_scenes
 
 ARM = """<body name="{0}" pos="{1} 0 1"><joint name="{0} upper" axis="0 1 0" damping="0.1" range="-170 170"/>
@@ -51,12 +51,13 @@ STANDS = """<mujoco><worldbody><body pos="0 0 1"><joint name="{0}" type="slide" 
 <geom type="box" size="0.1 0.1 0.1" mass="1"/></body></worldbody></mujoco>"""
 
 
-def setup_for(xml, **request):
-    return replace(setup_of_file(xml), alone=True, request=Request(**request), command="run --error 0.001")
+def setup_for(xml, **asked):
+    options = ReductionOptions(**asked)
+    return replace(setup_of_file(xml), alone=True, options=options, command="run --error 0.001")
 
 
-def scene(xml, **request):
-    setup = setup_for(xml, **request)
+def scene(xml, **asked):
+    setup = setup_for(xml, **asked)
     return scene_of(setup, setup.reading)[0]
 
 
@@ -66,8 +67,8 @@ def waves(*names):
     return {"time": times} | {name: 0.3 * np.sin(2.0 * np.pi * times) for name in names}
 
 
-def answered(xml, **request) -> Result:
-    return reduction.rows(setup_for(xml, **request))
+def answered(xml, **asked) -> Result:
+    return reduction.rows(setup_for(xml, **asked))
 
 
 def told(result) -> dict:

@@ -10,9 +10,9 @@ from edited import setup_of_file
 
 from compare.cli.command_line import request
 from compare.core.check import Result
-from compare.engines.mujoco import ModelError
+from compare.core.errors import Refused
 from compare.experiments import reduction
-from compare.experiments.setup import Request
+from compare.experiments.options import ReductionOptions
 from compare.run.reference import compared_with
 
 CORNERS = "\n".join(f"v {place}" for place in ("0.1 0 0", "-0.1 0.1 0", "-0.1 -0.1 0", "0 0 0.2"))
@@ -39,12 +39,12 @@ def robot(tmp_path) -> Path:
 def answer(robot: Path, write: Path | str, *options: str) -> str:
     """Why a request to write there is refused before the run; "" if it is not."""
     words = ["reduction", "--mjcf", str(robot), "--write", str(write), "--out", str(robot.parent / "report")]
-    given = request([*words, *options])
+    _, given = request([*words, *options])
+    compared = compared_with(given.reference, str(robot))
     try:
-        assert compared_with(given.reference, str(robot)).request_of(given).write == str(
-            Path(write).absolute()
-        )
-    except ModelError as error:
+        validated = given.validated(compared.reading, compared.robot.name)
+        assert validated.write == str(Path(write).absolute())
+    except Refused as error:
         assert "\n" not in str(error)
         return str(error)
     return ""
@@ -108,7 +108,7 @@ def refuse(*_, **__):
 
 
 def written(robot: Path, path: Path) -> Result:
-    return reduction.rows(replace(setup_of_file(robot), alone=True, request=Request(write=str(path))))
+    return reduction.rows(replace(setup_of_file(robot), alone=True, options=ReductionOptions(write=str(path))))
 
 
 def told(result: Result) -> str:

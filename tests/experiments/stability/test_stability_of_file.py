@@ -10,7 +10,8 @@ from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
 from compare.core.text import say, screen
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments import stability
-from compare.experiments.setup import Request, Setup
+from compare.experiments.options import StabilityOptions
+from compare.experiments.setup import Setup
 from compare.experiments.stability import of_file
 from compare.stability.answer import StepLimitRow
 
@@ -21,8 +22,8 @@ SERVO, MOTOR = '<position joint="turn" kp="20" kv="5"/>', '<motor joint="turn"/>
 LIMIT = (-5.0 + (25.0 + 4.0 * 0.05 * 20.0) ** 0.5) / 20.0  # s, of Euler: 19.3 ms
 
 
-def found_of(actuator=SERVO, dt=0.002, size=Setup.quick, alone=False, text=TURNING, **asked):
-    setup = setup_of_file(text.format(dt=dt, actuator=actuator), size, request=Request(**asked))
+def found_of(actuator=SERVO, own_dt=0.002, size=Setup.quick, alone=False, text=TURNING, **asked):
+    setup = setup_of_file(text.format(dt=own_dt, actuator=actuator), size, options=StabilityOptions(**asked))
     return stability.rows(replace(setup, alone=alone))
 
 
@@ -63,13 +64,13 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
 
 @pytest.mark.parametrize("dt, asked, quantity, passes", [
     (0.002, {}, AT_OWN_STEP, True), (1.05 * LIMIT, {}, AT_OWN_STEP, False),
-    (0.002, {"step": (1.05 * LIMIT, "Euler")}, AT_REQUESTED_STEP, False),
-    (1.05 * LIMIT, {"step": (0.01, "Euler")}, AT_REQUESTED_STEP, True),
+    (0.002, {"dt": 1.05 * LIMIT, "integrator": "Euler"}, AT_REQUESTED_STEP, False),
+    (1.05 * LIMIT, {"dt": 0.01, "integrator": "Euler"}, AT_REQUESTED_STEP, True),
     (0.002, {"control_period": 0.01}, of_file.AT_PERIOD, True), (0.002, {"control_period": 0.05}, of_file.AT_PERIOD, False),
     (0.002, {"control_period": 0.01, "kp": 5.0}, of_file.AT_PERIOD, None),  # it has no motor
 ])  # fmt: skip
 def test_the_step_that_is_asked_for_is_judged(dt, asked, quantity, passes):
-    (check,) = found_of(dt=dt, **asked).checks
+    (check,) = found_of(own_dt=dt, **asked).checks
     assert (check.quantity, check.passed if check.judged else None) == (quantity, passes)
 
 
@@ -87,7 +88,7 @@ def test_the_posture_that_is_asked_for_is_the_start():
 
 
 def test_a_step_that_fails_is_said_with_what_helps():
-    result = found_of(dt=1.4 * LIMIT, size=Setup.small)
+    result = found_of(own_dt=1.4 * LIMIT, size=Setup.small)
     (answer,) = said(result, "answer")
     assert (
         answer.startswith("Not stable") and "home" in answer and "(turn)" in answer and "19 ms" not in answer

@@ -38,6 +38,6 @@ EDITS = (
      "any integrator's step is the file's"),
     ("stability.answer", "worst_step", "all(_1)", "any(_1)", "one posture at which the step is stable is enough"),
     ("stability.answer", "worst_step", "min(*_1)", "max(*_1)", "the largest of the limits"),
-    ("of_file", "begin", "request.step or _1", "_1", "a requested step is the file's"),
+    ("of_file", "begin", "asked.dt or _1", "_1", "a requested step is the file's"),
     ("of_file", "check", "row.stable_at_file_dt is None", "False", "what is not judged passes"),
 )  # fmt: skip
