@@ -98,34 +98,39 @@ def environment() -> Environment:
 
 def say(finding: Finding | str) -> str:
     """The sentences of a finding, in one line. What is text already stays as it is."""
+    before, _, after = parts(finding)
+    return f"{before} {after}".strip()
+
+
+def parts(finding: Finding | str) -> tuple[str, list[list[str]], str]:
+    """The sentences of a finding before a table, the rows of the table, and the sentences after it.
+
+    Lines of the template that begin with "|" are the rows, the first one the head: cells are separated by "|".
+    """
     if isinstance(finding, str):
-        return finding
+        return finding, [], ""
     lines = block(finding.of, finding.kind, **finding.values).splitlines()
-    return " ".join(" ".join(line for line in lines if not line.startswith(ROW)).split())
+    places = [number for number, line in enumerate(lines) if line.startswith(ROW)]
+    first, end = (places[0], places[-1] + 1) if places else (len(lines), len(lines))
+    before, after = (" ".join(" ".join(part).split()) for part in (lines[:first], lines[end:]))
+    rows = [[cell.strip() for cell in lines[number].strip().strip(ROW).split(ROW)] for number in places]
+    return before, rows, after
 
 
 def screen(finding: Finding | str) -> list[str]:
     """The lines of a finding on a terminal: its sentences before a table, the table, the sentences after it.
 
-    Lines of the template that begin with "|" are the rows of the table, the first one its head: cells are
-    separated by "|". Columns are aligned to the right, the first one, and those whose head begins with "<", to
-    the left.
+    Columns are aligned to the right, the first one, and those whose head begins with "<", to the left.
     """
-    if isinstance(finding, str):
-        return [finding]
-    lines = block(finding.of, finding.kind, **finding.values).splitlines()
-    rows = [number for number, line in enumerate(lines) if line.startswith(ROW)]
-    first, end = (rows[0], rows[-1] + 1) if rows else (len(lines), len(lines))
-    before, after = (" ".join(" ".join(part).split()) for part in (lines[:first], lines[end:]))
-    return [*filter(None, [before]), *aligned([lines[number] for number in rows]), *filter(None, [after])]
+    before, rows, after = parts(finding)
+    return [*filter(None, [before]), *aligned(rows), *filter(None, [after])]
 
 
-def aligned(rows: Sequence[str]) -> list[str]:
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """The lines of a table, after an empty one: see `screen`."""
     if not rows:
         return []
-    cells = [[cell.strip() for cell in row.strip().strip(ROW).split(ROW)] for row in rows]
-    columns = list(zip_longest(*cells, fillvalue=""))
+    columns = list(zip_longest(*rows, fillvalue=""))
     to_left = [number == 0 or column[0].startswith("<") for number, column in enumerate(columns)]
     columns = [(column[0].removeprefix("<").lstrip(), *column[1:]) for column in columns]
     widths = [max(map(len, column)) for column in columns]

@@ -9,9 +9,8 @@ from typing import get_type_hints
 from urllib.parse import quote
 
 from ..core.check import About
-from ..core.finding import Finding
 from ..core.rows import Row, column
-from ..core.text import block, environment, say
+from ..core.text import block, environment
 from ..report import files
 from ..report.document import joined, page_of
 from ..report.provenance import OURS, commit, installed
@@ -22,9 +21,12 @@ from .cache import write_whole
 from .models import place_of_report
 
 AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
-NOT_JUDGED, UNCONFIRMED, ITSELF = "not judged", "unconfirmed", "self-consistent"
-VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED, REFUSED, ITSELF, AGREE)  # in the order of the table
-BAD_VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED)  # exit status 1
+NOT_JUDGED, UNCONFIRMED, ENGINE, ITSELF = "not judged", "unconfirmed", "engine differs", "self-consistent"
+VERDICTS = (DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED, ENGINE, REFUSED, ITSELF, AGREE)  # in the order of the table
+# of the kinds of checks that fail; exit status 1. An unstable step is a column
+VERDICT_OF = {
+    "differing": DIFFER, "broke": BROKE, "not_judged": NOT_JUDGED, "unconfirmed": UNCONFIRMED, "of_engines": ENGINE,
+}  # fmt: skip
 
 
 @dataclass(kw_only=True)
@@ -49,7 +51,7 @@ class FileRow(Row):
 
     @property
     def is_bad(self) -> bool:
-        return self.verdict in BAD_VERDICTS
+        return self.verdict in VERDICT_OF.values()
 
     @property
     def kind(self) -> str:
@@ -87,31 +89,21 @@ def row_of_data(data: object) -> FileRow | None:
 def judge(row: FileRow, report: Report, reference: Reference) -> None:
     """Set the verdict, reason, largest share of a tolerance, and step of a row.
 
-    The reason names an unstable step and joints of other names too.
+    The reason is the cause of what differs, else the first check of each other kind, and joints of other names.
     """
     sections = report.sections
     failed, top = failures(sections), worst(sections)
-    unfinished = [f"{check.experiment}: {check.note}" for check in failed.broke]
     checks = [check for section in sections for check in section.result.checks]
-    reasons: list[str] = []
-    if failed.differing:
-        row.verdict = DIFFER
-        names = [cause.text for cause in report.causes] or [str(failed.differing[0])]
-        reasons.append(block("fleet", "some_of", reasons=names))
-    elif unfinished:
-        row.verdict = BROKE
-    elif not any(check.about == About.MODELS for check in checks):
-        row.verdict = REFUSED
-        reasons.append(block("fleet", "nothing_compared"))
-    else:
-        verdict = ITSELF if reference.kind == "model" else AGREE
-        verdict = UNCONFIRMED if failed.unconfirmed else verdict
-        row.verdict = NOT_JUDGED if failed.not_judged else verdict
-        kinds = [kind for kind in ("not_judged", "unconfirmed", "unstable") if getattr(failed, kind)]
-        reasons += [say(Finding("verdict", kind, {"checks": getattr(failed, kind)})) for kind in kinds]
-    if unfinished:
-        reasons.append(block("fleet", "unfinished", reasons=unfinished))
-    row.reason = "; ".join(filter(None, (*reasons, reference.matched, *reference.otherwise)))
+    kinds = [kind for kind, found in failed._asdict().items() if found]
+    judged = [VERDICT_OF[kind] for kind in kinds if kind in VERDICT_OF]
+    row.verdict = min(judged, key=VERDICTS.index, default=ITSELF if reference.kind == "model" else AGREE)
+    said = [block("verdict", "first", checks=getattr(failed, kind), kind=kind) for kind in kinds]
+    if not any(check.about == About.MODELS for check in checks) and not failed.broke:
+        row.verdict, said = REFUSED, [block("fleet", "nothing_compared")]
+    elif failed.differing:
+        names = [cause.text for cause in report.causes] or said[:1]
+        said = [block("fleet", "some", reasons=names, most=3), *(said[1:2] if failed.broke else [])]
+    row.reason = "; ".join(filter(None, (*said, reference.matched, *reference.otherwise)))
     row.worst_ratio = None if top is None else top.over_tolerance
     steps = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     row.stable_at_file_dt, row.limit = worst_step(steps)
@@ -138,6 +130,5 @@ def write_table(out: Path, rows: Sequence[FileRow], left_out: LeftOut, command: 
 
 def document_of(rows: Sequence[FileRow], **values: object) -> str:
     """report.md. values: summary, left_out and origin, as in write_table."""
-    title, good = block("fleet", "title"), not any(row.is_bad for row in rows)
-    template = environment().get_template("fleet_document.md.jinja")
-    return joined([template.render(rows=rows, title=title, good=good, **values)])
+    about = {"rows": rows, "title": block("fleet", "title"), "good": not any(row.is_bad for row in rows)}
+    return joined(environment().get_template("fleet_document.md.jinja").render(**about, **values))

@@ -5,27 +5,26 @@ from collections.abc import Sequence
 from functools import partial
 from html import unescape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import pandas as pd
 from markdown_it import MarkdownIt
 from markupsafe import Markup
 
-from ..core.rows import Row
-from ..core.text import block, count, environment
-from ..core.words import capital
+from ..core.finding import Finding
+from ..core.text import block, count, environment, escaped, say
 from ..robots import Robot
 from . import tables
 from .images import embedded
 from .questions import answers
-from .verdict import Figure, Report, Section, failures, headline, outcome, standing
+from .verdict import Figure, Report, failures, headline, outcome, standing
 
 MOST_ROWS = 8  # of a table; its file has all
-MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 FIRST_CAUSES = 4  # on the first screen
 TITLES = {"what_should_i_use": "What should I use?", "engines_answer": "Which engine?"}  # of tables
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
+OF_TABLES = {name: getattr(tables, name) for name in ("of_cells", "of_rows", "of_checks", "of_causes", "of_origin")}
 
 
 class Picture(NamedTuple):
@@ -36,40 +35,27 @@ class Picture(NamedTuple):
     fails: bool  # whether something fails in what it shows
 
 
-class Listing(NamedTuple):
-    """The first rows of a table, and how many it has."""
-
-    total: int
-    rows: pd.DataFrame | None  # None: its file alone has them
-    name: str = ""  # of its file
-    title: str = ""
-
-
 class Document:
     def __init__(self, report: Report):
         self.report, robot = report, report.robot
-        values = {"outcome": outcome, "standing": standing, "headline": headline}
-        # its attributes are the macros
-        self.template: Any = environment().get_template("document.md.jinja").make_module(values)
         self.answers = answers(report.sections, robot)
-        self.title = block("verdict", "title", own=bool(robot.own), robot=robot.described or robot.name)
+        self.name = robot.described or robot.name
+        names = [section.name for section in report.sections] if report.runs_file else []
+        self.title = block("introduction", "title", own=bool(robot.own), robot=self.name, names=names)
 
     def text(self) -> str:
         """The whole document."""
         report, robot = self.report, self.report.robot
         lines = report.verdict.split("\n"), report.top
-        first, *others = sum(reversed(lines) if report.answers_first else lines, list[str]())
-        parts = [self.template.head(self.title, report.first_lines, first, others, report.passed)]
-        introduction = self.template.introduction(robot, robot.described or robot.name, joints_of(robot))
-        parts += [self.first_screen(), " ".join(introduction.split())]
-        if report.causes:
-            parts.append(self.template.causes(tables.of_causes(report.causes)))
-        if self.answers is not None:
-            parts.append(self.template.questions(self.answers))
-        parts += map(self.section, report.sections)
-        parts.append(self.template.skipped(report.skipped) if report.skipped else "")
-        parts.append(self.template.provenance(tables.of_origin(report.origin)))
-        return joined(parts)
+        about = {"name": self.name, "joints": joints_of(robot), "runs_file": report.runs_file}
+        introduction = block("introduction", "introduction", robot=robot, **about)
+        template = environment().get_template("document.md.jinja")
+        return joined(template.render(
+            report=report, title=self.title, lines=sum(reversed(lines) if report.answers_first else lines, list[str]()),
+            explained=self.explained(), pictures=self.pictures(), introduction=" ".join(introduction.split()),
+            answers=self.answers, outcome=outcome, standing=standing, headline=headline, most=MOST_ROWS, titles=TITLES,
+            **OF_TABLES,
+        ))  # fmt: skip
 
     def page(self, folder: Path) -> str:
         """The document as a page; folder: that of the report, with its figures."""
@@ -77,17 +63,24 @@ class Document:
         links += [(section.name, standing(section)[0] is False) for section in self.report.sections]
         return page_of(self.title, self.text(), self.report.passed, [*links, ("provenance", False)], folder)
 
-    def first_screen(self) -> str:
-        """A line for each experiment, the pictures, and what explains that checks fail."""
-        report = self.report
-        failed = [check for kind in failures(report.sections) for check in kind]
-        of_first = tables.of_checks(failed[:FIRST_CAUSES], ON_FIRST_SCREEN)
-        failing = Listing(len(failed), of_first, title="Failing checks")
-        if report.causes:
-            table = tables.of_causes(report.causes[:FIRST_CAUSES]).drop(columns="rank")
-            title = "Cause" if len(report.causes) == 1 else "Causes"
-            failing = Listing(len(report.causes), table, name="causes", title=title)
-        return self.template.first_screen(report.sections, report.skipped, self.pictures(), failing)
+    def tolerances(self) -> str:
+        """A page with the formulas of the tolerances."""
+        sections = [section for section in self.report.sections if section.tolerance]
+        parts = [f"# Tolerances of {escaped(self.title)}", escaped(say(Finding("introduction", "tolerances")))]
+        for section in sections:
+            texts = section.title, " ".join(section.formulas.split())
+            parts.append('<section id="{}">\n\n## {}\n\n{}\n\n</section>'.format(section.name, *map(escaped, texts)))
+        return page_of("Tolerances", "\n\n".join(parts), True, [(section.name, False) for section in sections])
+
+    def explained(self) -> list[tuple[pd.DataFrame, str, int]]:
+        """What explains that checks fail, else the first of them, as a table with its title and how many more there are."""
+        causes = self.report.causes
+        if causes:
+            table = tables.of_causes(causes[:FIRST_CAUSES]).drop(columns="rank")
+            return [(table, "Cause" if len(causes) == 1 else "Causes", len(causes) - FIRST_CAUSES)]
+        failed = [check for kind in failures(self.report.sections) for check in kind]
+        table = tables.of_checks(failed[:FIRST_CAUSES], ON_FIRST_SCREEN)
+        return [(table, "Failing checks", len(failed) - FIRST_CAUSES)] if failed else []
 
     def pictures(self) -> list[Picture]:
         """The pictures, those in which something fails first; a figure of what fails, if none shows it."""
@@ -107,25 +100,6 @@ class Document:
             without_caption = figure._replace(caption="")
             pictures.append(Picture(without_caption, section.name, section.title, figure.caption, True))
         return sorted(pictures, key=lambda picture: not picture.fails)
-
-    def section(self, section: Section) -> str:
-        not_judged = [check for check in section.result.checks if not check.judged]
-        figures = section.own_figures
-        first = figures if len(figures) <= MOST_FIGURES else figures[:FIRST_FIGURES]
-        first = [figure for figure in figures if figure in first or figure.moves]
-        found = {"Failing checks": section.failed, "Not judged": not_judged}
-        lists = {k: Listing(len(checks), tables.of_checks(checks[:MOST_ROWS])) for k, checks in found.items()}
-        of_section = [self.table(section, name, rows) for name, rows in section.tables.items()]
-        folded = [figure for figure in figures if figure not in first]
-        return self.template.section(section, lists, of_section, first, folded)
-
-    def table(self, section: Section, name: str, rows: Sequence[Row]) -> Listing:
-        """A table with the rows that a reader needs; its rows are None where only its file has them."""
-        title = TITLES.get(name, capital(name.replace("_", " ")))
-        columns = section.result.shown if name == section.name else None
-        if columns == [] or name in section.result.filed:
-            return Listing(len(rows), None, name, title)
-        return Listing(len(rows), tables.of_rows(rows[:MOST_ROWS], columns), name, title)
 
 
 def page_of(
@@ -155,8 +129,8 @@ def joints_of(robot: Robot) -> list[str]:
     return [count(counts[kind], name) for kind, name in JOINTS.items() if counts.get(kind)]
 
 
-def joined(paragraphs: Sequence[str]) -> str:
-    """Paragraphs as one text, with one empty line between them, but none between the items of a list."""
-    lines = "\n".join(line.rstrip() for line in "\n\n".join(paragraphs).split("\n"))
+def joined(text: str) -> str:
+    """A text with one empty line between its paragraphs, but none between the items of a list."""
+    lines = "\n".join(line.rstrip() for line in text.split("\n"))
     text = re.sub(r"\n{3,}", "\n\n", lines).strip() + "\n"
     return re.sub(r"(?m)^(- .*)\n\n(?=- )", r"\1\n", text)

@@ -27,6 +27,7 @@ def write(folder: Path, report: Report) -> None:
     document = Document(report)
     save(folder / "report.md", document.text())
     save(folder / "index.html", document.page(folder))
+    save(folder / "tolerances.html", document.tolerances())
     save(folder / "reproduce.py", reproduce.script(report))
     results = {
         "passed": report.passed,

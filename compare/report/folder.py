@@ -20,7 +20,7 @@ try:
 except ImportError:  # Windows: what a killed run leaves stays there
     fcntl = None
 
-OWN = ("report.md", "index.html", "results.json", "reproduce.py", "tables", "figures")
+OWN = ("report.md", "index.html", "results.json", "reproduce.py", "tolerances.html", "tables", "figures")
 UNCHANGED = "the earlier report is unchanged"
 
 

@@ -36,6 +36,12 @@ def text_of(value: Any, column: Column) -> str:
     return f"{text[: LONGEST_LIST - 4]} ..." if is_long else text
 
 
+def of_cells(cells: Sequence[Sequence[str]]) -> pd.DataFrame:
+    """A table of texts, the head first, as a terminal has it."""
+    columns = [name.removeprefix("<").strip() for name in cells[0]]
+    return pd.DataFrame([[*row, *[""] * (len(columns) - len(row))] for row in cells[1:]], columns=columns)
+
+
 def of_rows(rows: Sequence[Row], shown: Sequence[str] | None = None) -> pd.DataFrame:
     """The rows of a table. shown: the names of its columns, if not all."""
     columns = columns_of(rows)

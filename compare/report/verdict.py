@@ -9,11 +9,12 @@ from ..core.check import About, Check, Result
 from ..core.finding import Finding
 from ..core.records import Experiment
 from ..core.rows import Row
-from ..core.text import block, say, screen
+from ..core.text import block, parts, say, screen
 from ..core.words import capital
 from ..robots import Robot
 
 UNKNOWN = Experiment()
+MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
 
@@ -37,7 +38,10 @@ class Figure(NamedTuple):
 
 @dataclass
 class Section:
-    """An experiment in a report, with what the report has to know of it."""
+    """An experiment in a report, with what the report has to know of it.
+
+    tolerance: in words, and after an empty line its formulas.
+    """
 
     name: str
     title: str
@@ -46,6 +50,14 @@ class Section:
     result: Result
     figures: list[Figure] = field(default_factory=list)
     record: Experiment = UNKNOWN  # what the program knows of it
+
+    @property
+    def tolerance_in_words(self) -> str:
+        return " ".join(self.tolerance.partition("\n\n")[0].split())
+
+    @property
+    def formulas(self) -> str:
+        return self.tolerance.partition("\n\n")[2]
 
     @property
     def notes(self) -> list[str]:
@@ -58,8 +70,22 @@ class Section:
         return {name: rows for name, rows in tables.items() if rows}
 
     @property
+    def filed(self) -> dict[str, list[Row]]:
+        """The tables of which a report has only the files."""
+        names = {*self.result.filed, *([self.name] if self.result.shown == [] else [])}
+        return {name: rows for name, rows in self.tables.items() if name in names}
+
+    @property
+    def shown(self) -> dict[str, list[Row]]:
+        return {name: rows for name, rows in self.tables.items() if name not in self.filed}
+
+    @property
     def judged(self) -> list[Check]:
         return [check for check in self.result.checks if check.judged]
+
+    @property
+    def open(self) -> list[Check]:
+        return [check for check in self.result.checks if not check.judged]
 
     @property
     def failed(self) -> list[Check]:
@@ -68,6 +94,16 @@ class Section:
     @property
     def own_figures(self) -> list[Figure]:
         return [figure for figure in self.figures if not figure.is_overview]
+
+    @property
+    def first_figures(self) -> list[Figure]:
+        """Those that are not folded."""
+        most = MOST_FIGURES if len(self.own_figures) <= MOST_FIGURES else FIRST_FIGURES
+        return [figure for k, figure in enumerate(self.own_figures) if k < most or figure.moves]
+
+    @property
+    def folded_figures(self) -> list[Figure]:
+        return [figure for figure in self.own_figures if figure not in self.first_figures]
 
 
 Sections = Sequence[Section]
@@ -92,7 +128,21 @@ class Report(NamedTuple):
     @property
     def top(self) -> list[str]:
         """What is said of the robot below the verdict, in sentences."""
-        return [say(text) for section in self.sections for text in section.result.top]
+        texts = [text for section in self.sections for text in section.result.top]
+        if len(self.sections) > 1:
+            return list(map(say, texts))
+        return [line for before, _, after in map(parts, texts) for line in (before, after) if line]
+
+    @property
+    def tables(self) -> list[list[list[str]]]:
+        """The tables that the answer to one question has, each the cells of its rows, the head first."""
+        texts = self.sections[0].result.top if len(self.sections) == 1 else []
+        return [rows for _, rows, _ in map(parts, texts) if rows]
+
+    @property
+    def runs_file(self) -> bool:
+        """Whether it only asks about the file as it is, with contacts and actuators: nothing is switched off."""
+        return all(bool(section.record.first_screen) for section in self.sections)
 
     @property
     def answers_first(self) -> bool:

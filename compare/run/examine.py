@@ -223,7 +223,7 @@ def section_with(name: str, result: Result, robot: Robot, is_alone: bool = False
         result.notes = [text for text in result.top if text not in top] + result.notes
         result.top = top
     of_robot = {"robot": robot, "values": experiment.claim_values(robot)}
-    claim, tolerance = (say(Finding(name, kind, of_robot)) for kind in ("claim", "tolerance"))
+    claim, tolerance = say(Finding(name, "claim", of_robot)), block(name, "tolerance", **of_robot)
     return Section(name, title, claim, tolerance, result, record=record)
 
 
