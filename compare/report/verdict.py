@@ -142,7 +142,7 @@ class Report(NamedTuple):
     @property
     def runs_file(self) -> bool:
         """Whether it only asks about the file as it is, with contacts and actuators: nothing is switched off."""
-        return all(bool(section.record.first_screen) for section in self.sections)
+        return all(section.record.runs_file for section in self.sections)
 
     @property
     def answers_first(self) -> bool:
