@@ -12,7 +12,7 @@ EXPERIMENT = Experiment(order=30, asks_of_own=("com_positions", "jacobians"))
 
 def quantities(robot: Robot) -> list[str]:
     """The quantities that tmt's equations, or a user's own, give."""
-    names = ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv")
+    names = ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "c", "dc/dq", "centroidal momentum matrix")
     return [name for name in names if not robot.own or QUANTITIES[name].function in robot.own]
 
 

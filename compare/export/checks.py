@@ -123,6 +123,10 @@ def scales_of(entries: Entries, name: str, states: States, exact: Pairs) -> Sequ
     """The scales of a quantity that MuJoCo has not, one for each of its arrays."""
     (q, qd, third, dt), tree, n = states, entries.tree, entries.tree.coordinates.nv
     function, argument = name.partition(":")[0], argument_of(name)
+    if function == "coriolis_matrix":
+        return [entries.coriolis_matrix]
+    if function == "regressor":
+        return [entries.regressor(third)]
     if function == "inverse_mass_matrix":
         return [entries.solved(np.eye(n), exact.high)]
     if function == "inverse_dynamics":

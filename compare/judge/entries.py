@@ -96,8 +96,49 @@ class Entries:
     @cached_property
     def weight(self) -> np.ndarray:
         """Of the torque that balances gravity, N m or N, (states, nv)."""
-        g = float(np.linalg.norm(self.tree.gravity))
-        return self.of_states(g * np.einsum("b,sbi->si", self.mass, self.t))
+        return float(np.linalg.norm(self.tree.gravity)) * self.momentum
+
+    @cached_property
+    def com(self) -> np.ndarray:
+        """Of the centre of mass of all, m, (states, 1)."""
+        return (self.reach @ self.mass)[:, None] / sum(self.tree.mass)
+
+    @cached_property
+    def com_jacobian(self) -> np.ndarray:
+        """(states, 1, nv)."""
+        return self.momentum[:, None] / sum(self.tree.mass)
+
+    @cached_property
+    def momentum(self) -> np.ndarray:
+        """Linear, for unit speeds, (states, nv)."""
+        return self.of_states(np.einsum("b,sbi->si", self.mass, self.t))
+
+    @cached_property
+    def centroidal_momentum_matrix(self) -> np.ndarray:
+        """(states, 6, nv): of the angular rows sum of k (m W t_i + |I| u_i), W as in (2)."""
+        arms = from_centre(self.tree, self.q) + self.reach.max(axis=0, initial=0.0) / FACTOR
+        angular = np.einsum("b,sbi->si", self.mass * arms, self.t) + self.inertia @ self.turns
+        return np.stack([self.momentum] * 3 + [self.of_states(angular)] * 3, axis=1)
+
+    @cached_property
+    def coriolis_matrix(self) -> np.ndarray:
+        """Of half of dh/dqd, and of Mbar times the speeds of balls, (states, nv, nv)."""
+        brackets = np.zeros((len(self.q), *self.added.shape[1:]))
+        for joint in self.tree.coordinates.balls:
+            brackets[:, joint.qd, joint.qd] = np.abs(self.qd[:, joint.qd]).sum(axis=1)[:, None, None]
+        return self.force_rates(0.0)[1] + self.added @ brackets
+
+    def regressor(self, qdd: ArrayLike) -> np.ndarray:
+        """Of a torque for a unit of mass, first moment or inertia of a body, (states, nv, 10 m)."""
+        sizes = np.abs(np.broadcast_to(qdd, self.qd.shape))
+        turning = sizes @ self.turns.T + self.spin**2  # (states, m)
+        a = np.einsum("sbi,si->sb", self.t, sizes) + 2.0 * self.spin * self.speed + self.slip * self.spin
+        a = a + np.linalg.norm(self.tree.gravity)
+        of_mass = a[:, :, None] * self.t
+        of_moment = turning[:, :, None] * self.t + a[:, :, None] * self.turns
+        of_inertia = turning[:, :, None] * self.turns
+        columns = np.stack([of_mass, *[of_moment] * 3, *[of_inertia] * 6], axis=3) * self.count[:, None, None]
+        return columns.transpose(0, 2, 1, 3).reshape(*self.qd.shape, -1)
 
     def of_states(self, scale: np.ndarray) -> np.ndarray:
         """A scale that may be one for all states, for each of them."""

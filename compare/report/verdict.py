@@ -118,7 +118,9 @@ class Report(NamedTuple):
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
     first_lines: Sequence[str] = ()  # what is said of it
-    plain: Mapping[str, Any] | None = None  # how plain MuJoCo evaluates states, see engines.mujoco.Mujoco.plain
+    plain: Mapping[str, Any] | None = (
+        None  # how plain MuJoCo evaluates states, see engines.mujoco.Mujoco.plain
+    )
     is_complete: bool = True  # an interrupt ends a run before all experiments are finished
 
     @property

@@ -317,8 +317,14 @@ class Pushed:
         """
         if self.motion.program or len(self.motion.times):
             return None
-        fine, is_chance = [self.fine_run(self.push, way) for way in range(WAYS)], self.place_is_chance(self.push)
-        fast, found = max(FAST, 10.0 * float(max(run.most.max() for run in fine))), list[tuple[str, int, Run]]()
+        fine, is_chance = (
+            [self.fine_run(self.push, way) for way in range(WAYS)],
+            self.place_is_chance(self.push),
+        )
+        fast, found = (
+            max(FAST, 10.0 * float(max(run.most.max() for run in fine))),
+            list[tuple[str, int, Run]](),
+        )
         for way, beside in enumerate(fine):
             run = self.run(self.push, way, dt, integrator, fast=fast)
             found.append((self.failure(run, beside, self.push, is_chance), way, run))
@@ -388,9 +394,7 @@ class Pushed:
             return "grows"
         return "elsewhere" if not is_chance and self.rests and self.elsewhere(run, fine) > ELSEWHERE else ""
 
-    def further(
-        self, push: float, dt: float, integrator: str, ways: range
-    ) -> Iterator[tuple[str, int, Run]]:
+    def further(self, push: float, dt: float, integrator: str, ways: range) -> Iterator[tuple[str, int, Run]]:
         """How runs of further patterns fail, or "", what moves first, and the runs.
 
         They are judged beside the fine runs of the first patterns, of which the fastest counts.
@@ -419,7 +423,9 @@ class Pushed:
         more = MORE_WAYS if self.rests else MORE_WAYS // 2  # what falls is no more certain with more of them
         for why, dof, run in self.further(push, dt, integrator, range(WAYS, WAYS + more)):
             if why:
-                self.tried[key] = verdict._replace(why=why, dof=dof, speed=max(float(run.last.max()), verdict.speed))
+                self.tried[key] = verdict._replace(
+                    why=why, dof=dof, speed=max(float(run.last.max()), verdict.speed)
+                )
                 return False
         self.surely.add(key)
         return True

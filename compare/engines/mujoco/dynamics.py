@@ -30,6 +30,7 @@ from .names import (
     on,
 )
 from .stepper import Stepper
+from .whole import Whole
 
 Array = np.ndarray | float
 Pair = tuple[np.ndarray, np.ndarray]
@@ -62,6 +63,7 @@ class MujocoDynamics:
         self.qpos = np.array([i for place in places for i in place.qpos])
         self.dofs = np.array([i for place in places for i in place.dofs])
         self.forward(np.array(case.tree.zero))
+        self.whole = Whole(model)
         self.zero_axes = self.turns(self.data.xmat)
 
     def com_positions(self, q: Array) -> np.ndarray:
@@ -120,6 +122,18 @@ class MujocoDynamics:
     def bias(self, q: Array, v: Array) -> np.ndarray:
         """h, N m, (..., nv): qfrc_bias."""
         return self._each(lambda d: d.qfrc_bias[self.dofs], q, v)
+
+    def com(self, q: Array) -> np.ndarray:
+        """Centre of mass of all that moves, m, (..., 3): subtree_com."""
+        return self._each(self.whole.com, q)
+
+    def com_jacobian(self, q: Array) -> np.ndarray:
+        """m/rad, (..., 3, nv): mj_jacSubtreeCom."""
+        return self._each(lambda d: self.whole.com_jacobian(d)[:, self.dofs], q)
+
+    def centroidal_momentum_matrix(self, q: Array) -> np.ndarray:
+        """kg m/rad and kg m2/rad, (..., 6, nv): mass times mj_jacSubtreeCom, above mj_angmomMat."""
+        return self._each(lambda d: self.whole.momentum(d)[:, self.dofs], q)
 
     def gravity_balance(self, q: Array) -> np.ndarray:
         """N m, (..., nv): qfrc_bias at rest."""

@@ -24,7 +24,12 @@ from . import standing, ways
 from .ways import CENTRED, ONE_SIDED, DerivativeRow, Subject, WayRow, number
 
 EXPERIMENT = Experiment(
-    order=105, serves_own=False, runs_file=True, timed=True, quick_speeds=8, first_screen=("answer", "standing")
+    order=105,
+    serves_own=False,
+    runs_file=True,
+    timed=True,
+    quick_speeds=8,
+    first_screen=("answer", "standing"),
 )
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
 FEW_SPEEDS = 8  # of a robot for which tmt's derivatives are compiled in a second
