@@ -119,7 +119,9 @@ def test_a_wrong_file_differs_from_the_stated_numbers_and_not_from_its_own(insid
         assert main(["parameters", "--quick", "--mjcf", str(path), *asked, "--out", str(out)]) == status
         empty, first, *lines = capsys.readouterr().out.splitlines()
         other = "the arm's stated numbers" if kind == "arm" else "tmt's equations for it"
-        assert not empty and first.startswith(f"two.xml and {other} {'differ' if status else 'agree'} in parameters")
+        assert not empty and first.startswith(
+            f"two.xml and {other} {'differ' if status else 'agree'} in parameters"
+        )
         results = results_in(out)
         assert results["reference"] == {"kind": kind, "name": name}
         assert [cause["place"] for cause in results["causes"]] == ["mass of forearm", "gravity z"] * status
@@ -158,7 +160,11 @@ def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(inside, tmp
     assert main(words) == 1
     lines = capsys.readouterr().out.splitlines()
     empty, first, *_, last = lines
-    assert not empty and first.startswith('Not stable: 2 ms with Euler, from "qpos0"') and last.startswith("Report: ")
+    assert (
+        not empty
+        and first.startswith('Not stable: 2 ms with Euler, from "qpos0"')
+        and last.startswith("Report: ")
+    )
     assert len(lines) <= 13
     report = (out / "report.md").read_text(encoding="utf-8")
     assert 0 < report.index("Not stable") < report.index("0 of 1 check")

@@ -128,7 +128,9 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     status, out, err = answered(["speed", *asked], capsys)
     assert (status, out) == (2, "") and "speed does not apply to double" in err.splitlines()[-1]
     status, out, err = answered(["gravity", "--joints=-hip,knee", *asked], capsys)
-    assert (status, err) == (1, "a user's file may print\n") and out.startswith("\ndouble.xml and mine.py:Object differ")
+    assert (status, err) == (1, "a user's file may print\n") and out.startswith(
+        "\ndouble.xml and mine.py:Object differ"
+    )
     results = json.loads((folder / "out" / "results.json").read_text(encoding="utf-8"))
     assert results["reference"] == {"kind": "own", "name": "mine.py:Object"} and not results["passed"]
     assert {path.name for path in folder.iterdir()} == {"double.xml", "mine.py", "numbers_beside.py", "out"}

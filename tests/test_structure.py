@@ -19,7 +19,9 @@ LIBRARIES = {
     "newton": "engines.newton", "pinocchio": "engines.pinocchio", "pydrake": "engines.drake", "pandas": "report stability.api",
     "matplotlib": "report.style", "PIL": "report.images", "distributed": "fleet.executors", "rich": "report.terminal",
 }  # fmt: skip
-SHARED = tuple(f"compare.experiments.{name}" for name in ("figures", "options", "quantities", "runs", "setup"))
+SHARED = tuple(
+    f"compare.experiments.{name}" for name in ("figures", "options", "quantities", "runs", "setup")
+)
 DRAWING = ("matplotlib", "PIL")  # for modules whose name begins with figures, too
 FOR_DOCSTRINGS = {("tmt.export", "tmt")}  # exported functions have those of the public ones
 

@@ -22,7 +22,7 @@ class Cause:
     joints: str = ""  # how joints are to be stated, joints=[...]; "": no convention, or they cannot be
     quantity: str = ""  # of a number of the file: its name in `parameters`
     form: str = ""  # its place with {} for the body or joint
-    owners: int = 1  # the bodies or joints that it is of
+    owners: int = 1  # the bodies or joints that it is of; of a body's numbers how many differ
     cost: float = 0.0  # beside that of its kind and its numbers, see diagnosis/likelihood.py
     size: float = inf  # of such a number: its difference over its tolerance
 

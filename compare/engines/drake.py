@@ -136,7 +136,7 @@ class Model(ReadModel):
         """Balls have no rotor and no spring, and the damping of a free body is in other axes: they are left as they are."""
         is_left = np.zeros(np.shape(values), bool)
         if name != "gravity":
-            is_left = self.order.is_of_free() | (self.order.is_of_ball() & (name != "damping"))
+            is_left = self.order.of_free | (self.order.of_ball & (name != "damping"))
         self.rest = self.stated["rest"]
         self.used[name] = np.where(is_left, self.used[name], values)
         self.settle()
@@ -146,16 +146,23 @@ class Model(ReadModel):
 
         self.plant.SetPositions(self.context, at.x)
         inboard = {int(joint.child_body().index()): joint for joint in joints_of(self.plant)}
+        movers: dict[int, int | None] = {0: None}  # the joints of the Tree, by the indices of bodies
+
+        def mover(index: int) -> int | None:
+            if index not in movers:
+                joint = inboard[index]
+                number = self.joints.get(joint.index())
+                movers[index] = mover(int(joint.parent_body().index())) if number is None else number
+            return movers[index]
+
         links = []
         for index in range(1, self.plant.num_bodies()):
-            body, joint = self.plant.get_body(BodyIndex(index)), inboard.get(index)
+            body = self.plant.get_body(BodyIndex(index))
             inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
             mass, com, pose = inertia.get_mass(), inertia.get_com(), body.EvalPoseInWorld(self.context)
             about_com = inertia.CalcRotationalInertia().CopyToFullMatrix3() - point_inertia(com, mass)
-            parent = int(joint.parent_body().index()) if joint else None
-            number = self.joints.get(joint.index()) if joint else None
             place = pose.rotation().matrix(), pose.translation()
-            links.append(Link(index, parent, number, *place, Body(mass, com, about_com)))
+            links.append(Link(index, mover(index), *place, Body(mass, com, about_com)))
         return links
 
     def set_body(self, link: Link, body: Body) -> None:
@@ -182,7 +189,7 @@ class Model(ReadModel):
         key = course.method, course.dt, course.steps, course.tolerance, course.tau.tobytes()
         if key == self.simulated:
             return
-        if course.tau[self.order.is_of_free() | self.order.is_of_ball()].any():
+        if course.tau[self.order.of_free | self.order.of_ball].any():
             raise EngineError("a torque on a ball or a free body would turn with it, as Drake's axes do not")
         plant = self.plant_of(course.dt if course.method == DISCRETE else 0.0, has_springs=True)
         simulator = Simulator(plant)

@@ -53,11 +53,12 @@ class Model(OfCompiled):
         M, h, a = map(np.asarray, functions()["values"](self.first.replace(**none), self.data, *state))
         return M, h, a
 
-    def path(self, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
-        model = model.tree_replace({"opt.timestep": np.asarray(course.dt, self.precision)})
-        path = functions()["path"](model, self.data, *start, course.every, records=len(course.times) - 1)
+    def run(self, course: Course) -> tuple[Array, None]:
+        dt, records = np.asarray(course.dt, self.precision), len(course.times) - 1
+        model = self.model_of(course).tree_replace({"opt.timestep": dt})
+        path = functions()["path"](model, self.data, *self.start(course), course.every, records=records)
         qpos, qvel = map(np.asarray, path)
-        return qpos, qvel
+        return np.vstack([course.start, np.hstack([qpos[:, self.qpos], qvel[:, self.dofs]])]), None
 
 
 @cache

@@ -63,7 +63,7 @@ class Model(ReadModel):
         for number, k in self.last.items():
             inertia, place = self.model.inertias[number], self.data.oMi[number]
             body = Body(inertia.mass, inertia.lever.copy(), inertia.inertia.copy())
-            links.append(Link(number, None, k, place.rotation.copy(), place.translation.copy(), body))
+            links.append(Link(number, k, place.rotation.copy(), place.translation.copy(), body))
         return links
 
     def set_body(self, link: Link, body: Body) -> None:

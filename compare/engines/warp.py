@@ -64,11 +64,6 @@ class Model(OfCompiled):
     def held(self, model: Any, name: str) -> Array:
         return np.asarray(attrgetter(name)(model).numpy()[0])  # all worlds share it
 
-    def place(self, *start: Array) -> None:
-        """Give the data a state: qpos, qvel and applied force."""
-        for field, values in zip((self.data.qpos, self.data.qvel, self.data.qfrc_applied), start):
-            field.assign(np.asarray(values, np.float32)[None])
-
     def replay(self, name: str, call: Callable[[Any], object]) -> Callable[[], None]:
         """A function that repeats a call for the data; the kernels that it launches are recorded once."""
         if name not in self.graphs:
@@ -82,33 +77,27 @@ class Model(OfCompiled):
         forward = self.replay("forward", lambda data: self.engine.forward(self.undamped, data))
         self.place(at.x, at.u, force)
         forward()
-        M, row = (
-            np.zeros((at.u.size, at.u.size)),
-            np.repeat(np.arange(at.u.size), self.undamped.M_rownnz.numpy()),
-        )
-        column, data = self.undamped.M_colind.numpy(), self.data
+        nv, data = at.u.size, self.data
+        M, row, column = np.zeros((nv, nv)), np.arange(nv), self.undamped.M_colind.numpy()
+        row = np.repeat(row, self.undamped.M_rownnz.numpy())
         M[row, column] = M[column, row] = data.M.numpy()[0]  # the lower triangle, row by row
         return M, data.qfrc_bias.numpy()[0].copy(), data.qacc.numpy()[0].copy()
 
-    def step_alone(self, course: Course) -> Callable[[], None]:
-        return self.begun(self.model_of(course), self.placed(course.q, course.v, course.tau), course)
+    def place(self, *start: Array) -> None:
+        """Give the data a state: qpos, qvel and applied force."""
+        for field, values in zip((self.data.qpos, self.data.qvel, self.data.qfrc_applied), start):
+            field.assign(np.asarray(values, np.float32)[None])
 
-    def begun(self, model: Any, start: list[Array], course: Course) -> Callable[[], None]:
-        """A step from a start and on, by the kernels that were recorded."""
+    def step_alone(self, course: Course) -> Callable[[], None]:
+        """A step from the start and on, by the kernels that were recorded."""
+        model = self.model_of(course)
         model.opt.timestep.fill_(course.dt)
         advance = self.replay(course.method, partial(self.engine.step, model))
-        self.place(*start)  # the recording has moved them
+        self.place(*self.start(course))  # the recording has moved them
         return advance
 
-    def path(self, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
-        advance, states = self.begun(model, start, course), []
-        for _ in course.times[1:]:
-            for _ in range(course.every):
-                advance()
-            # on a CPU the arrays are views
-            states.append((self.data.qpos.numpy()[0].copy(), self.data.qvel.numpy()[0].copy()))
-        qpos, qvel = map(np.array, zip(*states))
-        return qpos, qvel
+    def reached(self) -> tuple[Array, Array]:
+        return self.data.qpos.numpy()[0][self.qpos], self.data.qvel.numpy()[0][self.dofs]
 
 
 class Stepper(as_it_runs.Stepper):

@@ -259,7 +259,8 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
         of_numbers = of_numbers or attempt("parameters", setup, functions("parameters").rows, setup)[0]
         numbers = of_numbers.causes if of_numbers else []
     others = [cause for cause in numbers if cause.quantity not in IN_EQUATIONS]
-    if setup.robot.is_stated and numbers and len(numbers) < len(others) + 2:
+    in_equations = sum(cause.owners for cause in numbers if cause not in others)
+    if setup.robot.is_stated and numbers and in_equations < 2:
         return numbers, 0
     found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
     if found is None:

@@ -21,7 +21,15 @@ from compare.core.text import say
 from compare.engines import EngineRecord
 from compare.engines.outside import Outside
 from compare.engines.outside.as_it_runs import Difference, Run
-from compare.engines.outside.bodies import OF_JOINTS, Body, combined, links_of, numbers_of, size_of
+from compare.engines.outside.bodies import (
+    OF_JOINTS,
+    Body,
+    combined,
+    differences,
+    links_of,
+    numbers_of,
+    size_of,
+)
 from compare.engines.outside.file import EngineError, File
 from compare.engines.outside.model import Reading, ReadModel
 from compare.engines.outside.order import Order
@@ -206,14 +214,12 @@ def test_a_quantity_just_inside_and_just_outside_its_tolerance(quantity, name, p
 @pytest.mark.parametrize("number", OF_ALL)
 def test_a_number_as_read_just_inside_and_just_outside(number):
     """Masses and inertias are checked; another number is a row alone."""
-    from compare.engines.outside.answers import differences
-
     stated = numbers_of(ARM.tree)
     for off, differs in ((60.0, False), (70.0, True)):
         result, read = empty(), {name: stated[name].copy() for name in OF_ALL}
         eps, size = RECORDS["float64"].eps, size_of(stated, number)
         read[number][..., -1] += off * eps * size if size else 1.0 * differs  # the arm has no armature
-        found = differences(read, stated, eps)
+        found = differences(read, stated, FACTOR * eps)
         assert found == (number,) * differs
         reading = Reading(read, stated, (), found, (), 0.0)
         file = File(Path(ARM.mjcf), ARM.joints, ARM.coordinates.all_kinds)

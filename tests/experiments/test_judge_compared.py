@@ -141,7 +141,7 @@ def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_
     dynamics = SimpleNamespace(other_forces=other_forces)
     for share, passed in ((0.99, [True, False, True]), (1.01, [True, False, False])):
         forces["fluid and tendons"], result = share * least, Result("parameters")
-        check_forces(result, sample, dynamics)
+        check_forces(result, sample, dynamics, False)
         assert list(verdicts(result).values()) == passed
 
 

@@ -9,6 +9,7 @@ from models import PATHS
 from compare.core.check import Result
 from compare.engines.mujoco.parameters import Stated
 from compare.experiments import parameters
+from compare.experiments.parameters.causes import causes_of
 from compare.experiments.parameters.numbers import compare_number, rows_of
 from compare.experiments.setup import Setup, engines
 from compare.run.reference import compared_with
@@ -60,7 +61,7 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
 def test_a_number_may_be_off_by_its_tolerance(quantity, stated, share, passes):
     result, off = Result("parameters"), 1e-9
     number = Stated("arm", quantity, stated, stated + share * off, tolerance=off)
-    causes = compare_number(result, number, "", {}).causes
+    causes = causes_of([compare_number(result, number, "")], ("here", "there"))
     assert (result.checks[0].passed, not causes) == (passes, passes)
 
 
@@ -80,18 +81,19 @@ def test_a_row_has_what_is_compiled_less_what_is_stated():
 )
 def test_an_axis_of_the_opposite_sense_is_a_convention_and_is_said(compiled, rank, is_said):
     number = Stated("elbow", "axis", np.array([0.0, 0.6, 0.8]), np.array(compiled), tolerance=1e-12)
-    causes = compare_number(Result("parameters"), number, "", {}).causes
+    causes = causes_of([compare_number(Result("parameters"), number, "")], ("here", "there"))
     assert {cause.rank for cause in causes} == {rank}
     assert {"opposite sign" in cause.text for cause in causes} == {is_said}
 
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
-    (cause,) = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "", {}).causes
+    mass = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "kg")
+    (cause,) = causes_of([mass], ("robot.xml", "right.xml"))
     assert (cause.rank, cause.place, cause.stated, cause.explains) == (2, "mass of arm", 2.0, 2.5)
-    result, vector = Result("parameters"), Stated("arm", "com", np.zeros(3), np.array([0.0, 1e-30, np.nan]))
-    places = [cause.place for cause in compare_number(result, vector, "", {}).causes]
-    assert places == ["com y of arm", "com z of arm"]
-    assert failing(result) == ["com"]
+    assert cause.text == "mass of arm: 2.5 kg in robot.xml, 2 kg in right.xml"
+    result, vector = Result("parameters"), Stated("arm", "com", np.zeros(3), np.array([0.0, 0.0, np.nan]))
+    (cause,) = causes_of([compare_number(result, vector, "m")], ("robot.xml", "right.xml"))
+    assert (cause.place, cause.explains) == ("com z of arm", None) and failing(result) == ["com"]
 
 
 @pytest.mark.parametrize("moved, passes", [(0.0, True), (1e-13, False), (-1e-13, False)])

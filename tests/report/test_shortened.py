@@ -113,7 +113,9 @@ def test_a_report_of_a_robot_with_any_names(tmp_path, capsys):
         assert not re.search(rf'(href|src)="(?!{own})', of)
     out = capsys.readouterr().out
     assert all(c.isprintable() or c == "\n" for c in page + out)
-    assert out.startswith("\n") and f"{ATTACK}\\nb.xml and tmt's equations for it agree" in out.splitlines()[1]
+    assert (
+        out.startswith("\n") and f"{ATTACK}\\nb.xml and tmt's equations for it agree" in out.splitlines()[1]
+    )
     assert "<script" not in page
     policy = re.search(r'-Policy" content="([^"]+)"', page)[1]
     # nothing is loaded or run

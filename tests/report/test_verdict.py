@@ -31,7 +31,11 @@ OWN_STEP = ("stable at its own step", 0.002, 0.00111, "at most", False, About.ST
 
 
 def line_of(section) -> str:
-    about = {"checks": len(section.result.checks), "failed": len(section.failed), "failing": failures([section])}
+    about = {
+        "checks": len(section.result.checks),
+        "failed": len(section.failed),
+        "failing": failures([section]),
+    }
     return block("run", "outcome", name=section.name, seconds=1.0, **about)
 
 
@@ -120,7 +124,9 @@ def test_what_was_not_judged_is_neither_passed_nor_failed_and_nothing_is_said_to
 ])  # fmt: skip
 def test_an_experiment_of_several_has_a_line(checks, word, count):
     line = line_of(section("mass", *checks))
-    assert line.split()[:2] == ["mass", word] and count in line and line.endswith(" 1.0 s") and len(line) <= 80
+    assert (
+        line.split()[:2] == ["mass", word] and count in line and line.endswith(" 1.0 s") and len(line) <= 80
+    )
 
 
 def test_what_explains_the_same_as_a_cause_has_a_line_beneath_it():

@@ -24,8 +24,8 @@ from ...process.workers import WorkerEnded, Workers
 from ...robots.case import Case
 from .. import RECORDS, Array, Course, Engine, Method, Motion, OneByOne, Prepared, Setting
 from ..mujoco.source import is_urdf
+from ..own.equations import passive
 from . import answers
-from .bodies import passive
 from .file import EngineError, File, TooLong
 from .model import Reading
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -15,21 +15,19 @@ import tmt
 from ...core import timing
 from ...core.errors import described
 from ...core.words import in_one_line
-from ...judge.scale import FACTOR
 from .. import RECORDS, Array, Course, Motion
-from .bodies import OF_BODIES, Numbers, size_of
 from .file import EngineError, File, Unread
 from .model import Reading, ReadModel
 
 if TYPE_CHECKING:
     from .as_it_runs import Run
 
-ROUNDS = 5  # of timing
+ROUNDS = 5  # of timing a short run
 LIMIT = 120.0  # s, of an answer: compiling a large model may take hours
 T = TypeVar("T")
 
 
-def answer(act: Callable[..., T], *arguments: Any) -> T:
+def answer(act: Callable[..., T], *arguments: object) -> T:
     """act(*arguments); EngineError with the reason, in one line, where it raises."""
     with raising(EngineError, with_place=True):
         return act(*arguments)
@@ -58,35 +56,8 @@ def read(name: str, file: File, tree: tmt.Tree) -> tuple[ReadModel, Reading]:
     kind: type[ReadModel] = module_of(name).Model
     with raising(Unread, with_place=False):
         model = kind(file, record.precision)
-    model.stated = stated = model.numbers_stated(tree)
-    numbers = {number: np.array(values, float) for number, values in model.numbers().items()}
-    lacking = [
-        number for number in ("damping", "stiffness") if number not in numbers and stated[number].any()
-    ]
-    differing = differences(numbers, stated, record.eps)
-    for number in differing:
-        if number not in OF_BODIES:
-            model.set(number, stated[number])
-    if {*differing} & {
-        *OF_BODIES
-    }:  # where places alone differ, bodies are displaced, and their mass is right
-        moments = (np.linalg.eigvalsh(values["inertia"]) for values in (numbers, stated))
-        off = np.abs(np.subtract(*moments)).max(axis=1) / size_of(stated, "inertia")
-        off = np.maximum(off, np.abs(numbers["mass"] - stated["mass"]) / size_of(stated, "mass"))
-        model.set_bodies(np.flatnonzero(off > FACTOR * record.eps).tolist())
-    not_set = differences(model.numbers(), stated, record.eps) if differing else ()
-    seconds = time.perf_counter() - begin
-    return model, Reading(numbers, stated, tuple(lacking), differing, not_set, seconds)
-
-
-def differences(numbers: Numbers, stated: Numbers, eps: float) -> tuple[str, ...]:
-    """The names of the numbers that differ from those stated by more than the rounding of what is added."""
-    differing = []
-    for number, values in numbers.items():
-        largest = np.abs(values - stated[number]).max(initial=0.0)
-        if not largest <= FACTOR * eps * size_of(stated, number):
-            differing.append(number)
-    return tuple(differing)
+    found = model.compare(tree, record.eps)
+    return model, found._replace(seconds=time.perf_counter() - begin)
 
 
 def reading(name: str, file: File, tree: tmt.Tree) -> Reading:
@@ -121,20 +92,25 @@ def prepared(name: str, file: File, tree: tmt.Tree, course: Course) -> tuple[flo
 
 
 def ran(name: str, file: File, tree: tmt.Tree, course: Course) -> Motion:
-    """A run, timed in this process: the fastest of some."""
+    """A run, timed in this process: the fastest of some, or the only one where it takes long enough."""
     model, _ = read(name, file, tree)
-    found: dict[str, Motion] = {}
+    order, _ = module_of(name).METHODS[course.method]
 
-    def run() -> None:
+    def run() -> tuple[Motion, float]:
         states, evaluations, why = course.start[None], None, "a number is not finite"
+        begin = time.perf_counter()
         try:
             states, evaluations = model.run(course)
         except ArithmeticError as error:  # it cannot go on
             why = str(error)
-        found["motion"] = course.motion(np.asarray(states, float), why)._replace(evaluations=evaluations)
+        seconds = time.perf_counter() - begin
+        evaluations = order and order * course.steps if evaluations is None else evaluations
+        return course.motion(np.asarray(states, float), why)._replace(evaluations=evaluations), seconds
 
-    seconds = timing.fastest({"": run}, ROUNDS)[""]
-    return found["motion"]._replace(seconds=seconds)
+    motion, seconds = run()
+    if seconds < timing.TIMED_ENOUGH:
+        seconds = timing.fastest({"": run}, ROUNDS)[""]
+    return motion._replace(seconds=seconds)
 
 
 def run_as_it_is(name: str, file: File, tree: tmt.Tree, iterations: int | None) -> "Run | None":

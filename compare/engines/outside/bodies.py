@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -31,11 +31,10 @@ class Body(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A body as an engine lists it, at a posture."""
+    """A body as an engine has it, at a posture."""
 
-    name: object  # of the engine: text or a number
-    parent: object
-    joint: int | None  # of the Tree, by which it moves on its parent; None: it is fixed there
+    name: Any  # of the engine: text or a number
+    joint: int | None  # of the Tree, with which it moves and not with the next one; None: none moves it
     turn: Array  # (3, 3) from its axes to those of the world
     origin: Array  # (3,) m in the world
     body: Body  # in its axes
@@ -74,7 +73,7 @@ def links_of(tree: tmt.Tree, q: Array) -> list[Link]:
         if joint >= 0:
             turn = np.array([[*row] for row in frames[joint].turn])
             body = Body(tree.mass[number], np.array(tree.com[number]), np.array(tree.inertia[number]))
-            links.append(Link(number, None, joint, turn, np.array([*frames[joint].origin]), body))
+            links.append(Link(number, joint, turn, np.array([*frames[joint].origin]), body))
     return links
 
 
@@ -89,7 +88,12 @@ def body_numbers(
     (joints, 3) m: of a hinge, the point of its axis that is nearest to the world's origin; both 0 of a ball.
     """
     before, joints = links_at(reference), coordinates.places.joints
-    numbers = together(before, len(joints)) | {"com_moved": together(links_at(moved), len(joints))["com"]}
+    bodies, bodies_moved = (
+        [combined([link.in_world for link in links if link.joint == joint]) for joint in range(len(joints))]
+        for links in (before, links_at(moved))
+    )
+    numbers = dict(zip(Body._fields, map(np.array, zip(*bodies))))
+    numbers["com_moved"] = np.array([body.com for body in bodies_moved])
     axis, anchor = np.zeros((2, len(joints), 3))
     for k, joint in enumerate(joints):
         if joint.kind == "ball":
@@ -100,42 +104,6 @@ def body_numbers(
         if joint.kind == "hinge":
             anchor[k] = np.linalg.pinv(np.eye(3) - turn, CUTOFF) @ shift
     return numbers | {"axis": axis, "anchor": anchor}
-
-
-def size_of(stated: Numbers, number: str) -> float:
-    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a link.
-
-    Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may round.
-    """
-    largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in stated.items()}
-    if number == "inertia":
-        return largest[number] + largest["levers"]
-    if number == "axis":
-        return float(len(stated[number]))
-    if number in ("com", "com_moved", "anchor"):
-        return len(stated[number]) * (largest["com"] + largest["com_moved"] + largest["anchor"])
-    return largest[number]
-
-
-def movers(links: Sequence[Link]) -> list[int | None]:
-    """The Tree's joint with which each link moves, and not with the next one; None: none moves it."""
-    by_name = {link.name: link for link in links}
-
-    def mover(link: Link | None) -> int | None:
-        while link is not None and link.joint is None:
-            link = by_name.get(link.parent)
-        return link.joint if link else None
-
-    return [mover(link) for link in links]
-
-
-def together(links: Sequence[Link], joints: int) -> dict[str, Array]:
-    """mass, com and inertia of body_numbers, of links at a posture."""
-    bodies: list[list[Body]] = [[] for _ in range(joints)]
-    for link, joint in zip(links, movers(links)):
-        if joint is not None:
-            bodies[joint].append(link.in_world)
-    return dict(zip(Body._fields, map(np.array, zip(*map(combined, bodies)))))
 
 
 def movement(before: Sequence[Link], after: Sequence[Link]) -> tuple[Array, Array]:
@@ -156,7 +124,22 @@ def combined(parts: Sequence[Body]) -> Body:
     return Body(mass, centre, tensor)
 
 
-def passive(tree: tmt.Tree, q: Array, v: Array) -> Array:
-    """The forces of damping and springs of the joints, N m, (..., nv): D v + k (q - rest)."""
-    drag = np.array(tree.damping) * v
-    return drag + tmt.literal.spring_torque(q, tree) if tree.has_springs else drag
+def size_of(stated: Numbers, number: str) -> float:
+    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a link.
+
+    Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may round.
+    """
+    largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in stated.items()}
+    if number == "inertia":
+        return largest[number] + largest["levers"]
+    if number == "axis":
+        return float(len(stated[number]))
+    if number in ("com", "com_moved", "anchor"):
+        return len(stated[number]) * (largest["com"] + largest["com_moved"] + largest["anchor"])
+    return largest[number]
+
+
+def differences(numbers: Numbers, stated: Numbers, share: float) -> tuple[str, ...]:
+    """The names of the numbers that differ from those stated by more than a share of what is added."""
+    largest = {name: np.abs(values - stated[name]).max(initial=0.0) for name, values in numbers.items()}
+    return tuple(name for name, off in largest.items() if not off <= share * size_of(stated, name))

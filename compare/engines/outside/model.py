@@ -8,8 +8,9 @@ import numpy as np
 
 import tmt
 
+from ...judge.scale import FACTOR
 from .. import Array, Course
-from .bodies import Body, Link, Numbers, body_numbers, movers, numbers_of
+from .bodies import OF_BODIES, Body, Link, Numbers, body_numbers, differences, numbers_of, size_of
 from .file import EngineError, File
 from .order import Order, State
 
@@ -68,15 +69,24 @@ class ReadModel(ABC):
         return None
 
     def step_alone(self, course: Course) -> Callable[[], object] | None:
-        """A function that makes a step of a run once more, and nothing else; None: no Python runs between steps."""
+        """A function that makes a step from the start and on, and nothing else; None: no Python runs between steps."""
         return None
+
+    def reached(self) -> tuple[Array, Array]:
+        """q and v of the Tree after such a step."""
+        raise EngineError("the engine has no integrators")
 
     def run(self, course: Course) -> tuple[Array, int | None]:
         """States (nq + nv,) of the Tree at the times as (times, nq + nv), fewer if it breaks off; and its evaluations.
 
-        The damping and the springs of the file act.
+        The damping and the springs of the file act. Evaluations: None: as many in a step as the order says.
         """
-        raise EngineError("the engine has no integrators")
+        step, states = self.step_alone(course) or self.reached, [course.start]
+        for _ in course.times[1:]:
+            for _ in range(course.every):
+                step()
+            states.append(np.concatenate(self.reached()))
+        return np.array(states), None
 
     def numbers_stated(self, tree: tmt.Tree) -> Numbers:
         """The numbers with which `numbers` are compared, and those of numbers_of."""
@@ -84,19 +94,31 @@ class ReadModel(ABC):
 
     def numbers(self) -> Numbers:
         """What it has read: `used`, and the body_numbers of its links."""
-        if not self.links(self.order.state(self.stated["reference"])):
-            return dict(self.used)
         postures = self.stated["reference"], self.stated["moved"]
+        if not self.links_at(postures[0]):
+            return dict(self.used)
         return dict(self.used) | body_numbers(self.links_at, self.file.coordinates, *postures)
 
     def links_at(self, q: Array) -> Sequence[Link]:
         return self.links(self.order.state(q))
 
-    def set_bodies(self, joints: Sequence[int]) -> None:
-        """Set the bodies of joints as stated: of the links that move as one, the first has all the mass."""
-        links = self.links_at(self.stated["reference"])
-        for joint in joints:
-            body = Body(*(self.stated[name][joint] for name in ("mass", "com", "inertia")))
-            for link in [link for link, mover in zip(links, movers(links)) if mover == joint]:
-                self.set_body(link, link.in_own_axes(body) if body.mass else body)
-                body = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+    def compare(self, tree: tmt.Tree, eps: float) -> Reading:
+        """What was read beside a Tree, whose numbers are then set. Where places alone differ, the mass of bodies is right."""
+        self.stated = stated = self.numbers_stated(tree)
+        read, share = {name: np.array(values, float) for name, values in self.numbers().items()}, FACTOR * eps
+        lacking = [name for name in ("damping", "stiffness") if name not in read and stated[name].any()]
+        differing = differences(read, stated, share)
+        for name in [name for name in differing if name not in OF_BODIES]:
+            self.set(name, stated[name])
+        if {*differing} & {*OF_BODIES}:
+            moments = (np.linalg.eigvalsh(numbers["inertia"]) for numbers in (read, stated))
+            off = np.abs(np.subtract(*moments)).max(axis=1) > share * size_of(stated, "inertia")
+            off |= np.abs(read["mass"] - stated["mass"]) > share * size_of(stated, "mass")
+            for joint in np.flatnonzero(off).tolist():
+                # of the links that move as one the first has all the mass
+                body = Body(*(stated[name][joint] for name in Body._fields))
+                for link in [link for link in self.links_at(stated["reference"]) if link.joint == joint]:
+                    self.set_body(link, link.in_own_axes(body) if body.mass else body)
+                    body = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        not_set = differences(self.numbers(), stated, share) if differing else ()
+        return Reading(read, stated, tuple(lacking), differing, not_set, 0.0)

@@ -8,24 +8,15 @@ import numpy as np
 
 import tmt
 
-from .. import GRID, Array, Course
+from .. import Array, Course
 from .bodies import Numbers
 from .file import EngineError, File, Unread
 from .model import ReadModel
 from .order import Order
 
 METHODS = {"Euler": (1, "semi_implicit_euler"), "implicitfast": (1, "semi_implicit_euler"), "RK4": (4, "rk4")}
-STAGES = {"Euler": 1, "implicitfast": 1, "implicit": 1, "discrete": 1, "RK4": 4}
-BODIES = (
-    "body_mass",
-    "body_inertia",
-    "body_pos",
-    "body_quat",
-    "body_ipos",
-    "body_iquat",
-    "jnt_axis",
-    "jnt_pos",
-)
+BODIES = ("body_mass", "body_inertia", "body_pos", "body_quat", "body_ipos", "body_iquat", "jnt_axis",
+          "jnt_pos")  # fmt: skip
 
 
 class OfCompiled(ReadModel):
@@ -90,30 +81,18 @@ class OfCompiled(ReadModel):
             attrgetter(field)(self.bare)[index] = values
             self.put_models()
 
-    def placed(self, q: Array, *of_speeds: Array) -> list[Array]:
-        """q, and speeds or forces, (n,), in MuJoCo's order of joints."""
-        placed = [np.zeros(len(values), self.precision) for values in (q, *of_speeds)]
-        placed[0][self.qpos] = q
-        for vector, values in zip(placed[1:], of_speeds):
-            vector[self.dofs] = values
-        return placed
-
     def model_of(self, course: Course) -> Any:
         if course.method in self.missing:
             raise EngineError(self.missing[course.method])
         return self.models[course.method]
 
-    @abstractmethod
-    def path(self, model: Any, start: list[Array], course: Course) -> tuple[Array, Array]:
-        """qpos and qvel at the times of a course after the first, (times, n). start: qpos, qvel, applied force."""
-
-    def run(self, course: Course) -> tuple[Array, int]:
-        start = self.placed(course.q, course.v, course.tau)
-        qpos, qvel = self.path(self.model_of(course), start, course)
-        states = np.hstack([qpos[:, self.qpos], qvel[:, self.dofs]])
-        return np.vstack([course.start, states]), course.steps * STAGES[course.method]
+    def start(self, course: Course) -> list[Array]:
+        """qpos, qvel and the applied force, in MuJoCo's order of joints."""
+        start = [np.zeros(len(values), self.precision) for values in (course.q, course.v, course.tau)]
+        for vector, places, values in zip(start, (self.qpos, self.dofs, self.dofs), course[:3]):
+            vector[places] = values
+        return start
 
     def prepare(self, course: Course) -> None:
         """Compile, by a run without steps."""
-        q, rest = self.bare.qpos0[self.qpos], np.zeros_like(course.tau)
-        self.run(course._replace(q=q, v=rest, times=np.arange(GRID + 1.0), steps=0))
+        self.run(course._replace(q=self.bare.qpos0[self.qpos], v=np.zeros_like(course.v), steps=0))

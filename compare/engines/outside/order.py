@@ -28,22 +28,18 @@ class Code(NamedTuple):
     decode: Callable[[Array], Array]
 
 
-def quaternion(turn: Rotation) -> Array:
-    return np.roll(turn.as_quat(), 1)
-
-
 def rotation(wxyz: Array) -> Rotation:
     return Rotation.from_quat(np.roll(wxyz, -1))
 
 
-def unit(wxyz: Array) -> Array:
-    return wxyz / np.linalg.norm(wxyz)
+def quaternion(turn: Rotation) -> Array:
+    return np.roll(turn.as_quat(), 1)
 
 
 NUMBER = Code(1, np.array, np.array)
 CIRCLE = Code(2, lambda q: np.r_[np.cos(q), np.sin(q)], lambda x: np.arctan2(x[1:], x[:1]))
-WXYZ = Code(4, np.array, unit)
-XYZW = Code(4, lambda q: np.roll(q, -1), lambda x: unit(np.roll(x, 1)))
+WXYZ = Code(4, np.array, lambda x: x / np.linalg.norm(x))
+XYZW = Code(4, lambda q: np.roll(q, -1), lambda x: np.roll(x, 1) / np.linalg.norm(x))
 ANGLES = Code(3, lambda q: rotation(q).as_euler("xyz"), lambda x: quaternion(Rotation.from_euler("xyz", x)))
 
 
@@ -90,12 +86,12 @@ class Order:
     @cached_property
     def parts(self) -> list[tuple[slice, slice, Code]]:
         """The numbers of positions in the Tree, those in the engine, and how these are stated."""
-        codes = [CIRCLE if k in self.circles else NUMBER for k in range(len(self.joints))]
         parts = []
         for k, (start, _) in self.starts.items():
+            code = CIRCLE if k in self.circles else NUMBER
             if self.joints[k].kind == "ball":
-                codes[k] = self.free if self.file.is_free(k) else self.ball
-            parts.append((self.joints[k].q, slice(start, start + codes[k].size), codes[k]))
+                code = self.free if self.file.is_free(k) else self.ball
+            parts.append((self.joints[k].q, slice(start, start + code.size), code))
         return parts
 
     @cached_property
@@ -107,7 +103,8 @@ class Order:
             places[start : start + len(speeds)] = speeds
         return places
 
-    def is_of_free(self) -> Array:
+    @cached_property
+    def of_free(self) -> Array:
         """Whether a speed of the Tree is that of a free joint, (nv,)."""
         free = np.zeros(self.file.coordinates.nv, bool)
         for k, joint in enumerate(self.joints):
@@ -115,15 +112,10 @@ class Order:
                 free[joint.qd.start - 3 : joint.qd.stop] = True
         return free
 
-    def is_of_ball(self) -> Array:
+    @cached_property
+    def of_ball(self) -> Array:
         """Whether a speed of the Tree is that of a ball, a free joint's too, (nv,)."""
         return np.array(self.file.coordinates.kinds_of_speeds) == "ball"
-
-    def engine_positions(self, q: Array) -> Array:
-        x, moved = np.empty(max(part.stop for _, part, _ in self.parts)), q - self.reference
-        for place, part, code in self.parts:
-            x[part] = code.encode(moved[place])
-        return x
 
     def tree_state(self, x: Array, u: Array) -> tuple[Array, Array]:
         """q and v of the Tree."""
@@ -134,34 +126,35 @@ class Order:
         return q, np.linalg.solve(self.state(q).S, u)
 
     def tree_numbers(self, values: Array) -> Array:
-        """Numbers of the engine's speeds, (nv,) or (nv, nv), in the Tree's order; axes are left as they are."""
-        placed = np.empty_like(values)
-        placed[np.ix_(*[self.v] * values.ndim)] = values
+        """Numbers of the engine's speeds, (nv,), in the Tree's order; axes are left as they are."""
+        placed = np.empty(len(values))
+        placed[self.v] = values
         return placed
 
     def state(self, q: Array, v: Array | None = None) -> State:
         """A state; at rest by default."""
         v = np.zeros(self.file.coordinates.nv) if v is None else v
-        S, c = np.zeros((len(self.v),) * 2), np.zeros(len(self.v))
-        S[np.arange(len(self.v)), self.v] = 1.0
+        x, moved = np.empty(max(part.stop for _, part, _ in self.parts)), q - self.reference
+        for place, part, code in self.parts:
+            x[part] = code.encode(moved[place])
+        S, c = np.eye(len(self.v))[self.v], np.zeros(len(self.v))
         for k, (_, start) in self.starts.items():
             joint, rows = self.joints[k], slice(start, start + 3)
             if joint.kind != "ball":
                 continue
-            R = rotation(q[joint.q]).as_matrix()
-            is_free = self.file.is_free(k)
-            is_turned = self.angular_in_world if is_free else self.balls_in_parent
-            S[rows, joint.qd] = R if is_turned else np.eye(3)
+            R, is_free = rotation(q[joint.q]).as_matrix(), self.file.is_free(k)
+            S[rows, joint.qd] = (
+                R if (self.angular_in_world if is_free else self.balls_in_parent) else np.eye(3)
+            )
             if not is_free:
                 continue
             first = self.starts[k - 3][1]
             linear, of_origin = slice(first, first + 3), slice(joint.qd.start - 3, joint.qd.start)
             in_linear = np.eye(3) if self.linear_in_world else R.T
-            point = R @ self.points.get(k, np.zeros(3))
+            point, w = R @ self.points.get(k, np.zeros(3)), R @ v[joint.qd]
             S[linear, of_origin] = in_linear
             S[linear, joint.qd] = in_linear @ np.cross(R, point[:, None], axis=0)
-            w = R @ v[joint.qd]
             c[linear] = in_linear @ np.cross(w, np.cross(w, point))
             if not self.linear_in_world:  # the axes turn
                 c[linear] -= in_linear @ np.cross(w, v[of_origin] + np.cross(w, point))
-        return State(self.engine_positions(q), S @ v, S, c)
+        return State(x, S @ v, S, c)

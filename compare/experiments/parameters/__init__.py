@@ -3,13 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
 import tmt
 
-from ...core.cause import Cause
 from ...core.check import Result
 from ...core.finding import Finding
 from ...core.text import block
@@ -23,9 +23,21 @@ from ...robots.coordinates import Coordinates
 from ...robots.joint_map import places_of
 from .. import Experiment
 from ..setup import Setup
-from . import numbers
-from .common import causes_in_common
-from .numbers import ABSENT, OF_BODIES, UNITS, FeatureRow, NumberRow, touches
+from .causes import causes_of
+from .contacts import touches
+from .numbers import (
+    ABSENT,
+    OF_BODIES,
+    OF_FORCES,
+    UNITS,
+    Compared,
+    FeatureRow,
+    NumberRow,
+    check_forces,
+    compare_number,
+    rows_of,
+    unit_of,
+)
 
 EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
@@ -40,7 +52,7 @@ MAY_DIFFER = ("contact", "limit", "clamp", "actuator")
 def rows(setup: Setup) -> Result:
     """One row for each number; one check for each quantity of each joint or body; the causes that follow."""
     robot, reading = setup.robot, cast(Reading, setup.reading)
-    is_of_file = not robot.is_stated
+    is_of_file, file = not robot.is_stated, robot.mjcf.name
     result = Result("parameters", shown=[*SHOWN, "asked_by"] if is_of_file else SHOWN)
     dynamics = cast(MujocoDynamics, setup.compared()["mujoco"])
     joints = dict(enumerate(("the world", *robot.joints), start=-1))
@@ -51,34 +63,32 @@ def rows(setup: Setup) -> Result:
         if number.quantity == "contact pairs":
             number = number._replace(compiled=[float(len(touching))])
         # the first part of a free joint is a slide
-        unit = numbers.unit_of(number.quantity, bool(slides & {number.place, f"{number.place} x"}))
-        result.rows += numbers.rows_of(number, unit, number.why if is_of_file else None)
+        unit = unit_of(number.quantity, bool(slides & {number.place, f"{number.place} x"}))
+        result.rows += rows_of(number, unit, number.why if is_of_file else None)
         if number.stated is not None and not number.why:
             words = joints if number.quantity == "parent" else {}
-            compared.append(numbers.compare_number(result, number, unit, words))
-    result.causes = causes_in_common(compared, () if is_of_file else without_inertial(setup, dynamics))
-    texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
-    if extra := dynamics.additional_bodies():
-        texts["other mass"] = block("parameters", "additional", bodies=extra)
-    result.causes = [replace(each, text=texts.get(each.quantity, each.text)) for each in result.causes]
+            compared.append(compare_number(result, number, unit, words))
     if robot.stated_in:
-        result.causes += compare_features(result, robot)
-    forces = numbers.check_forces(result, setup.random, dynamics)
+        compared += compare_features(result, robot)
+    differing = {number.quantity for number in compared if number.differs.any()}
+    forces = check_forces(result, setup.random, dynamics, bool(differing & {*OF_FORCES}))
     if robot.is_read:
         result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
     else:
-        result.causes += forces
+        compared += forces
         if dynamics.may_touch and not touching:
             result.find("nothing_touches", states=len(setup.random.q))
     if is_of_file:
         for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
             result.rows.append(NumberRow(of="file", quantity=name, compiled=value, unit=unit))
-    result.causes = sorted(result.causes, key=urgency)
+    sides = (f"{file} as compiled", file) if is_of_file else (file, Path(robot.stated_in or robot.name).name)
+    texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
+    if extra := dynamics.additional_bodies():
+        texts["other mass"] = block("parameters", "additional", bodies=extra)
+    causes = causes_of(compared, sides, () if is_of_file else without_inertial(setup, dynamics))
+    causes = [replace(cause, text=texts.get(cause.quantity, cause.text)) for cause in causes]
+    result.causes = sorted(causes, key=lambda cause: (cause.rank, cause.quantity in AT_TIMES, -cause.size))
     return result
-
-
-def urgency(cause: Cause) -> tuple[int, bool, float]:
-    return cause.rank, cause.quantity in AT_TIMES, -cause.size
 
 
 def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:
@@ -150,20 +160,18 @@ def owners(tree: tmt.Tree, quantity: str) -> tuple[str, ...]:
     return tree.body_names if quantity in OF_BODIES else tree.joint_names
 
 
-def compare_features(result: Result, robot: Robot) -> list[Cause]:
-    """Checks that features without a term in the equations are as many as in the solution; else causes."""
-    compiled = {feature.feature: feature for feature in robot.features}
-    stated = {feature.feature: feature for feature in robot.features_stated}
-    causes = []
-    for name, feature in (stated | compiled).items():
+def compare_features(result: Result, robot: Robot) -> list[Compared]:
+    """Checks that features without a term in the equations are as many as in the solution."""
+    here = {feature.feature: feature for feature in robot.features}
+    there = {feature.feature: feature for feature in robot.features_stated}
+    compared = []
+    for name, feature in (there | here).items():
         if feature.treatment in (MODELLED, LEFT_OUT) or name in MAY_DIFFER:
             continue
-        number = float(stated[name].count if name in stated else 0)
-        value = float(compiled[name].count if name in compiled else 0)
-        if not result.check("file", f"{name}, how many", value, number, "", rule="equal").passed:
-            text = f"{name}: {number:g} in {robot.stated_in}, {value:g} in this file"
-            causes.append(numbers.cause(name, number, value, text, rank=2, size=1.0, quantity=name))
-    return causes
+        count, stated = (np.array([float(side[name].count if name in side else 0)]) for side in (here, there))
+        result.check("file", f"{name}, how many", count[0], stated[0], "", rule="equal")
+        compared.append(Compared("world", name, "", count, stated, count != stated, 1.0, 2))
+    return compared
 
 
 def headline(result: Result) -> Finding | None:

@@ -1,24 +1,22 @@
-"""Numbers, stated and compiled: their rows, checks and causes; that no other forces act; what touches."""
+"""Numbers, stated and compiled: their rows and checks; and that no other forces act."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from tmt import literal
 
-from ...core.cause import Cause
 from ...core.check import Result
 from ...core.rows import Row, column
-from ...diagnosis.places import unit_of as unit_of_joint
+from ...core.text import apart
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.parameters import ABSENT as FIELDS
 from ...engines.mujoco.parameters import STATED_FLAGS, Stated
 from ...judge.scale import EPS, FACTOR
 from ...robots import Feature
 from ...robots.states import Sample
-from ..setup import Setup
 
 # without a counterpart in the equations
 ABSENT = ("contact pairs", *(name for name in FIELDS if name != "tendon armature"))
@@ -34,7 +32,7 @@ UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gra
     "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s", "other mass": "kg",
     "tendon armature": "kg m2", "actuator armature": "kg m2",
 }  # fmt: skip
-FINER = 8  # steps in one of the scene, in which contacts are looked for
+OF_SLIDES = {"rad": "m", "N m s/rad": "N s/m", "N m/rad": "N/m", "N m": "N", "kg m2": "kg"}
 COMPONENTS = {1: [""], 3: [*"xyz"], 9: [row + of_row for row in "xyz" for of_row in "xyz"]}  # by their number
 
 
@@ -68,20 +66,59 @@ class FeatureRow(Row):
 
 
 class Compared(NamedTuple):
-    """A number, vector or tensor of a body or joint, and its causes, one for each component that differs."""
+    """A number, vector or tensor of a body or joint, here (as compiled) and there (as stated)."""
 
     place: str
     quantity: str
     unit: str
-    tolerance: float
-    stated: np.ndarray  # (components,)
-    compiled: np.ndarray
-    causes: list[Cause]
+    here: np.ndarray  # (components,)
+    there: np.ndarray
+    differs: np.ndarray  # which of them
+    size: float  # the largest difference over its tolerance
+    rank: int  # 1: an option or a convention of a joint (order, sign, zero); 2: one number
+    words: Mapping[int, str] = {}  # for whole numbers
+
+    @property
+    def shown(self) -> list[int]:
+        """The components that are said: the only one that differs; of a tensor those of its upper triangle that do."""
+        names, found = COMPONENTS[len(self.here)], np.flatnonzero(self.differs).tolist()
+        if len(names) == 9:
+            found = [k for k in found if names[k] == "".join(sorted(names[k]))] or found
+        return found if len(found) == 1 or len(names) == 9 else [*range(len(names))]
+
+    @property
+    def name(self) -> str:
+        """Of the quantity, with its components if not all are said."""
+        names = COMPONENTS[len(self.here)]
+        said = ", ".join(names[k] for k in self.shown) if len(self.shown) < len(names) else ""
+        return f"{self.quantity} {said}".rstrip()
+
+    @property
+    def full_name(self) -> str:
+        return self.name if self.place == "world" else f"{self.name} of {self.place}"
+
+    @property
+    def is_opposite(self) -> bool:
+        """Whether an axis points the other way."""
+        off = np.abs(self.here + self.there).max()
+        return self.quantity == "axis" and bool(off <= FACTOR * EPS * np.abs(self.there).max())
+
+    @property
+    def values(self) -> tuple[str, str]:
+        """Here and there, with the unit, in as many digits as tell them apart."""
+        if self.words:
+            return self.words[int(self.here[0])], self.words[int(self.there[0])]
+        pairs = [(self.here[k], self.there[k]) for k in self.shown]
+        sides = [apart(a, b, 7) for a, b in pairs], [apart(b, a, 7) for a, b in pairs]
+        said = (", ".join(side) if len(side) == 1 else f"({', '.join(side)})" for side in sides)
+        here, there = (f"{side} {self.unit}".rstrip() for side in said)
+        return here, there
 
 
 def unit_of(quantity: str, slides: bool) -> str:
     """The unit of a number of a body, or of a joint that turns or slides."""
-    return unit_of_joint(UNITS[quantity], "slide" if slides and quantity not in OF_BODIES else "hinge")
+    unit = UNITS[quantity]
+    return OF_SLIDES.get(unit, unit) if slides and quantity not in OF_BODIES else unit
 
 
 def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[NumberRow]:
@@ -97,82 +134,36 @@ def rows_of(number: Stated, unit: str, asked_by: str | None = None) -> list[Numb
     return rows
 
 
-def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str]) -> Compared:
-    """Add the check of a number of a body or joint.
-
-    words: for whole numbers. Rank 1: an option or a convention of a joint (order, sign, zero); 2: one number.
-    """
+def compare_number(result: Result, number: Stated, unit: str, words: Mapping[int, str] = {}) -> Compared:
+    """Add the check of a number of a body or joint."""
     quantity, tolerance = number.quantity, number.tolerance
-    stated, compiled = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
-    difference = np.abs(stated - compiled)
-    is_whole = quantity in WHOLE_NUMBERS
-    value, bound = (compiled[0], stated[0]) if is_whole else (difference.max(), tolerance)
+    there, here = (np.array(values, float).ravel() for values in (number.stated, number.compiled))
+    difference, is_whole = np.abs(there - here), quantity in WHOLE_NUMBERS
+    value, bound = (here[0], there[0]) if is_whole else (difference.max(), tolerance)
     rule = "equal" if is_whole else "at most"
     result.check(number.place, quantity, value, bound, unit, rounding=not is_whole, rule=rule)
-    is_flipped = quantity == "axis" and np.abs(stated + compiled).max() <= tolerance
-    rank = 1 if is_flipped or quantity in OPTIONS else 2
-    owner = "" if number.place == "world" else f"of {number.place}"
-    causes = []
-    for k, (name, a, b) in enumerate(zip(COMPONENTS[len(stated)], stated, compiled)):
-        if not difference[k] <= tolerance:
-            place = " ".join(filter(None, (quantity, name, owner)))
-            texts = [words.get(value, f"{value:.7g} {unit}".rstrip()) for value in (a, b)]
-            if texts[0] == texts[1]:
-                texts = [f"{float(value)!r} {unit}".rstrip() for value in (a, b)]
-            text = f"{place}: stated {texts[0]}, compiled {texts[1]}"
-            text += " (the opposite sign)" if is_flipped else ""
-            size = difference[k] / tolerance if tolerance else np.inf
-            causes.append(cause(place, a, b, text, rank=rank, size=float(size), quantity=quantity))
-    return Compared(number.place, quantity, unit, tolerance, stated, compiled, causes)
+    differs = ~(difference <= tolerance)
+    size = float(difference.max() / tolerance) if tolerance else np.inf
+    compared = Compared(number.place, quantity, unit, here, there, differs, size, 2, words)
+    return compared._replace(rank=1 if quantity in OPTIONS or compared.is_opposite else 2)
 
 
-def cause(place: str, stated: float, compiled: float, text: str, **more: Any) -> Cause:
-    number = float(compiled) if np.isfinite(compiled) else None
-    return Cause(place=place, stated=float(stated), explains=number, text=text, **more)
-
-
-def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics) -> list[Cause]:
-    """Check that no other forces act; these are causes unless those of the result explain them.
+def check_forces(result: Result, sample: Sample, dynamics: MujocoDynamics, explained: bool) -> list[Compared]:
+    """Check that no other forces act; those that do and are not explained.
 
     MuJoCo adds forces of fluid and tendons to springs and damping, of whose sum the rounding is allowed.
     """
     unexplained, tree = [], sample.tree
-    largest = np.abs(sample.qd * tree.damping).max() + np.abs(literal.spring_torque(tree, sample.q)).max()
+    springs = literal.spring_torque(tree, sample.q)
+    largest = np.abs(sample.qd * tree.damping).max() + np.abs(springs).max()
     for source, force in dynamics.other_forces(sample.q, sample.qd).items():
         allowed = FACTOR * EPS * float(largest) if source == "fluid and tendons" else 0.0
         most, is_rounded = float(np.abs(force).max()), allowed > 0.0
         check = result.check(sample.name, f"no forces of {source}", most, allowed, "N m", rounding=is_rounded)
-        if check.failed and not any(cause.quantity in OF_FORCES for cause in result.causes):
+        if check.failed and not explained:
             place = f"forces of {source}"
             if source == "actuators":
                 place += f" ({', '.join(dynamics.acting_actuators(sample.q, sample.qd))})"
-            text = f"{place}: stated none, up to {most:.3g} N m at random states"
-            unexplained.append(cause(place, 0.0, most, text, rank=2, quantity=place))
+            sides = np.array([most]), np.zeros(1)
+            unexplained.append(Compared("world", place, "N m", *sides, np.array([True]), np.inf, 2))
     return unexplained
-
-
-class Touch(NamedTuple):
-    """Two geoms that touch."""
-
-    geoms: tuple[str, str]
-    scene: str  # "": at a random state alone
-    time: float  # s, the first in that scene
-    q: list[float]  # rad
-
-
-def touches(setup: Setup, dynamics: MujocoDynamics) -> list[Touch]:
-    """The pairs of geoms that touch, each where it first does: in a scene by MuJoCo, at a random state."""
-    if not dynamics.may_touch:
-        return []
-    found: dict[tuple[str, str], Touch] = {}
-    for case in setup.robot.cases_of_torque:
-        acting = cast(MujocoDynamics, setup.engines["mujoco"].of(case))
-        motion = acting.run(case.q, case.v, case.tau, case.scene.dt / FINER, case.steps * FINER, "RK4")
-        q = motion.q[np.isfinite(motion.q).all(axis=1)]
-        for time, state, pairs in zip(motion.t.tolist(), q, acting.touching(q)):
-            for pair in pairs - found.keys():
-                found[pair] = Touch(pair, case.name, time, case.positions_of_all(state).tolist())
-    for state, pairs in zip(setup.random.q, dynamics.touching(setup.random.q)):
-        for pair in pairs - found.keys():
-            found[pair] = Touch(pair, "", 0.0, state.tolist())
-    return list(found.values())

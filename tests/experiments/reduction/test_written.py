@@ -108,7 +108,9 @@ def refuse(*_, **__):
 
 
 def written(robot: Path, path: Path) -> Result:
-    return reduction.rows(replace(setup_of_file(robot), alone=True, options=ReductionOptions(write=str(path))))
+    return reduction.rows(
+        replace(setup_of_file(robot), alone=True, options=ReductionOptions(write=str(path)))
+    )
 
 
 def told(result: Result) -> str:

@@ -16,7 +16,7 @@ EDITS = (
     ("verdict", "passed", "any(section.judged for section in sections)", "True", "a report without a check passes"),
     ("run.command", "carry_out", "0 if report.passed else 1", "0", "the exit status is 0 whatever fails"),
     ("run.examine", "add_problems", "asked is None or _1", "True", "a problem is told where nobody asks"),
-    ("run.examine", "causes", "len(numbers) < len(others) + 2", "True", "no slip is the cause of several numbers"),
+    ("run.examine", "causes", "in_equations < 2", "True", "no slip is the cause of several numbers"),
     ("run.examine", "causes", "setup.robot.own", "False", "numbers of the file are the cause of own equations"),
     ("run.examine", "progress", "1 + sum(_1)", "sum(_1)", "the first experiment is number 0"),
     ("drawing", "results_needed", "needed[-1:] != [experiment]", "False", "a picture is drawn before its results"),

@@ -1,0 +1,74 @@
+"""The causes of numbers that differ: one for a body or joint, and one for numbers that differ alike."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...core.cause import Cause
+from ...core.finding import Finding
+from ...core.text import say
+from .numbers import OF_BODIES, Compared
+
+SAME = 1e-9  # relative: a factor, or a change, that is the same at several places
+ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("anchor", "com"))  # quantities with a common factor
+OF_JOINTS = "anchor", "axis", "ref"
+
+
+def causes_of(
+    numbers: Sequence[Compared], sides: Sequence[str], from_geoms: Sequence[str] = ()
+) -> list[Cause]:
+    """The causes of all numbers that differ. sides: the names of here and there; from_geoms: bodies without inertial here."""
+    left, causes = [number for number in numbers if number.differs.any()], list[Cause]()
+
+    def explain(kind: str, together: Sequence[Compared], place: str = "", **values: Any) -> None:
+        first, about = together[0], {"numbers": together, "sides": sides, **values}
+        text = say(Finding("parameters", kind, about))
+        k = first.shown[0]
+        here, there = float(first.here[k]), float(first.there[k])
+        known: dict[str, Any] = {"stated": there, "explains": here if np.isfinite(here) else None}
+        size, rank = max(number.size for number in together), min(number.rank for number in together)
+        known |= {name: values[name] for name in known if name in values}
+        causes.append(Cause(place=place or text.partition(":")[0], text=text, rank=rank, size=size,
+                            quantity=first.quantity, owners=len(together) if kind == "differ" else 1, **known))  # fmt: skip
+        left[:] = [number for number in left if not any(number is other for other in together)]
+
+    for quantities in ALIKE:
+        of_kind = [number for number in numbers if number.quantity in quantities and number.there.any()]
+        together = [number for number in of_kind if any(number is other for other in left)]
+        if len(together) == len(of_kind) and (factor := common_factor(of_kind)):
+            explain("factor", together, quantities=quantities, factor=factor, stated=1.0, explains=factor)
+    if order := [number for number in left if number.quantity == "order"]:
+        every = [number for number in numbers if number.quantity == "order"]
+        there = ", ".join(number.place for number in every)
+        here = ", ".join(number.place for number in sorted(every, key=lambda number: float(number.here[0])))
+        explain("order", order, stated=there, explains=here)
+    while left:
+        first = left[0]
+        same = [number for number in left if number.quantity == first.quantity]
+        alike = [number for number in same if is_near(number.here - number.there, first.here - first.there)]
+        if len(alike) > 1 and first.rank == alike[-1].rank:
+            explain("alike", alike, is_moved=not all(is_near(number.there, first.there) for number in alike))
+            continue
+        kinds = OF_BODIES if first.quantity in OF_BODIES else OF_JOINTS
+        together = [number for number in left if number.place == first.place and number.quantity in kinds]
+        lacks = first.place in from_geoms and len(together) > 1
+        explain("differ", together if first in together else [first], lacks_inertial=lacks)
+    return causes
+
+
+def common_factor(numbers: Sequence[Compared]) -> float | None:
+    """The factor, not 1, between all numbers here and there of at least two places, if there is one."""
+    if len(numbers) < 2:
+        return None
+    there, here = (
+        np.concatenate([getattr(number, side) for number in numbers]) for side in ("there", "here")
+    )
+    factor = float(there @ here / (there @ there))
+    sizes = np.concatenate([np.full(len(number.there), np.abs(number.there).max()) for number in numbers])
+    is_common = (np.abs(here - factor * there) <= SAME * abs(factor) * sizes).all()
+    return factor if is_common and abs(factor - 1.0) > SAME else None
+
+
+def is_near(values: np.ndarray, others: np.ndarray) -> bool:
+    return bool(np.abs(values - others).max() <= SAME * np.abs(others).max())
