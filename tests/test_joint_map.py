@@ -5,7 +5,8 @@ import pytest
 
 import tmt
 from compare.robots.coordinates import Coordinates
-from compare.robots.joint_map import JointsError, joint_map, matched_joints
+from compare.robots.joint_map import JointsError, joint_map
+from compare.robots.placement import matched_joints
 
 ARM = Coordinates(("hip", "knee", "rail"), ("hinge", "hinge", "slide"))
 MIXED = Coordinates(("rail", "turn", "knee"), ("slide", "ball", "hinge"))
@@ -64,23 +65,21 @@ def test_two_maps_one_after_the_other_are_one(first, second, rng):
     assert np.allclose(both.own_speeds(v), outer.own_speeds(inner.own_speeds(v)))
 
 
-def tree(names, parent, places, axes) -> tmt.Tree:
-    """Hinges at these places, m, with a body of 1 kg on each."""
-    n, places = len(names), np.array(places, float)
-    offset = [place - (places[k] if k >= 0 else 0.0) for place, k in zip(places, parent)]
-    return tmt.Tree(names, parent, offset, axes, [0.0] * n, names, range(n), [1.0] * n, [(0.1, 0.2, 0.3)] * n, [np.eye(3)] * n,
-                    (0, 0, 0))  # fmt: skip
+def tree(names, kinds) -> tmt.Tree:
+    """A chain of joints along y with a body of 1 kg on each."""
+    n = len(names)
+    of_bodies = names, range(n), [1.0] * n, [(0.1, 0.2, 0.3)] * n, [np.eye(3)] * n
+    axes = [(0.0, 1.0, 0.0)] * n
+    return tmt.Tree(names, range(-1, n - 1), [np.zeros(3)] * n, axes, [0.0] * n, *of_bodies, (0, 0, 0), kinds)
 
 
-X, Y, O, A, B = (1, 0, 0), (0, 1, 0), (0, 0, 0), (1, 0, 0), (2, 0, 0)
-
-
-@pytest.mark.parametrize("stated, found, names", [
-    ((["a", "b", "c"], (-1, -1, -1), [O, A, B], [Y] * 3), (["x", "y", "z"], (-1, -1, -1), [A, B, O], [Y] * 3), "zxy"),
-    ((["a", "b", "c"], (-1, 0, -1), [O, A, A], [Y] * 3), (["x", "y", "z"], (-1, -1, 0), [O, A, A], [Y] * 3), "xzy"),
-    ((["a", "b"], (-1, 0), [O, O], [Y, X]), (["x", "y"], (-1, 0), [O, O], [(-1, 0, 0), (0, -1, 0)]), "yx"),
-    ((["a", "b"], (-1, -1), [O, A], [Y, Y]), (["B", "x"], (-1, -1), [O, A], [Y, Y]), "xB"),  # a capital is no other name
-    ((["aa", "aA"], (-1, -1), [O, A], [Y, Y]), (["Aa", "AA"], (-1, -1), [A, O], [Y, Y]), ("AA", "Aa")),  # either of two is
-], ids=["place", "depth", "axis", "name", "two names"])  # fmt: skip
-def test_joints_are_matched_by_name_then_by_place_depth_and_axis(stated, found, names):
-    assert matched_joints(tree(*stated), tree(*found), "it").names == tuple(names)
+@pytest.mark.parametrize("stated, found, kinds, names", [
+    (["a", "b", "c"], ["x", "y", "z"], "hhh", "xyz"), (["a", "b", "c"], ["x", "a", "z"], "hhh", "axz"),
+    (["B", "b"], ["x", "B"], "hh", "Bx"),  # a capital is no other name
+    (["aa", "aA"], ["Aa", "AA"], "hh", ("Aa", "AA")),  # either of two is
+    (["a", "b", "c"], ["x", "y", "z"], "hsh", "yxz"),  # in the file the slide is the first
+])  # fmt: skip
+def test_joints_are_matched_by_name_then_by_order_and_kind(stated, found, kinds, names):
+    kinds = [{"h": "hinge", "s": "slide"}[kind] for kind in kinds]
+    of_file = sorted(kinds, reverse=True)
+    assert matched_joints(tree(stated, kinds), tree(found, of_file), "it").names == tuple(names)

@@ -41,11 +41,11 @@ EXCHANGED = EXCHANGED.replace("X", HINGE.format("first", "1 0 0"))
 
 @pytest.mark.parametrize("asked, text, names", [
     ("arm", RENAMED, ("Alpha", "joint 1", "wrist")),
-    ("arm", EXCHANGED, ("second", "first", "gamma")),
+    ("arm", EXCHANGED, ("first", "second", "gamma")),
     (ITSELF, RENAMED.replace('axis="0 1 0"', 'axis="0 -1 0"'), ("Alpha", "joint 1", "wrist")),  # which is wrong
     ("arm", XML.replace('"gamma" type="hinge" axis="0 1 0"', '"elbow" type="hinge" axis="1 0 0"'), ("alpha", "beta", "elbow")),
 ])  # fmt: skip
-def test_joints_of_other_names_are_matched_by_place_axis_and_type(tmp_path, asked, text, names):
+def test_joints_of_other_names_are_matched_by_order_and_type(tmp_path, asked, text, names):
     path = written(tmp_path, text)
     assert compared_with(None, path)[0].kind == "model"
     reference, robot, mujoco, _ = compared_with(asked, path)

@@ -1,4 +1,4 @@
-"""The joints of a user's equations: their order, sense, zero and units; joints of two files.
+"""The joints of a user's equations: their order, sense, zero and units.
 
 A user states joints in the order of the arguments: "knee"; "-knee", opposite sense; "knee+90deg",
 "knee-0.1rad", "slider+0.2m", another zero (own position = position of the model + 90 deg); "knee in deg",
@@ -7,15 +7,13 @@ deg". Mbar and h are always per rad and in N m.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-import tmt
-
-from ..core.words import listed, some_of
-from .coordinates import FREE, Coordinates, free_joints
+from ..core.words import listed
+from .coordinates import Coordinates
 
 PER_UNIT = {"": (1.0, 1.0), "deg": (180.0 / np.pi, 180.0 / np.pi), "deg (rad/s)": (180.0 / np.pi, 1.0)}
 NUMBER = r"[+-](?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -162,101 +160,3 @@ def read_joint(text: str, coordinates: Coordinates) -> Joint:
         raise JointsError(f"joint {text!r}: {name} is a slide, its unit is m")
     zero = float(np.radians(zero)) if measure == "deg" else zero
     return Joint(name, -1.0 if match["sign"] else 1.0, zero, unit, kind == "slide")
-
-
-# joints of two files
-
-OTHER_TYPE = 1e6  # cost of joints of different kinds, which are never matched
-# cost of a match: 1 - |cos| of axes, depth, distance / size of the robot, opposite axis, order (breaks ties)
-OF_AXIS, OF_DEPTH, OF_PLACE, OF_SENSE, OF_ORDER = 4.0, 1.5, 1.0, 0.5, 1e-3
-
-
-class Unmatched(ValueError):
-    """Some joints have no counterpart; the message names them."""
-
-
-class Matched(NamedTuple):
-    """The joints of a file."""
-
-    names: tuple[str, ...]  # in the order of the reference's joints
-    renamed: tuple[str, ...]  # "wrist as hand": not matched by name
-
-
-def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
-    """The joints of a tree for those of a reference: by name, else by place, axis and type. Unmatched."""
-    from scipy.optimize import linear_sum_assignment  # slow import
-
-    pairs = same_names(reference.joint_names, tree.joint_names)
-    stated = [i for i in range(len(reference.joint_names)) if i not in pairs]
-    others = [j for j in range(len(tree.joint_names)) if j not in pairs.values()]
-    costs = costs_of(reference, tree)
-    rows, columns = linear_sum_assignment(costs[np.ix_(stated, others)])
-    for row, column in zip(rows, columns):
-        if costs[stated[row], others[column]] < OTHER_TYPE:
-            pairs[stated[row]] = others[column]
-    refuse_unmatched(reference, tree, pairs, whose)
-    names = tuple(tree.joint_names[pairs[i]] for i in range(len(reference.joint_names)))
-    renamed = [f"{name} as {right}" for name, right in zip(names, reference.joint_names) if name != right]
-    return Matched(names, tuple(renamed))
-
-
-def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]:
-    """Joints of the same name, also with other capital letters: {index: index}."""
-    pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
-    lower, right = [name.casefold() for name in names], [name.casefold() for name in reference]
-    for i, name in enumerate(right):
-        is_only_one = lower.count(name) == right.count(name) == 1
-        if i not in pairs and is_only_one and lower.index(name) not in pairs.values():
-            pairs[i] = lower.index(name)
-    return pairs
-
-
-def costs_of(reference: tmt.Tree, tree: tmt.Tree) -> np.ndarray:
-    """The costs of matching a joint of the reference (row) with a joint of the tree (column)."""
-    (anchors, depths, axes), (other_anchors, other_depths, other_axes) = map(places_of, (reference, tree))
-    along = np.einsum("id,jd->ij", axes, other_axes)
-    apart = np.linalg.norm(anchors[:, None] - other_anchors, axis=-1)
-    size = max(np.ptp(anchors, axis=0).max(), np.ptp(other_anchors, axis=0).max(), 1e-9)
-    costs = OF_AXIS * (1.0 - np.abs(along)) + OF_SENSE * (along < 0.0) + OF_PLACE * apart / size
-    costs += OF_DEPTH * np.abs(np.subtract.outer(depths, other_depths))
-    costs += OF_ORDER * np.abs(np.subtract.outer(np.arange(len(depths)), np.arange(len(other_depths))))
-    return np.where(np.array(reference.kind)[:, None] == np.array(tree.kind), costs, OTHER_TYPE)
-
-
-def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The anchor of each joint in the world, m (n, 3), its depth in the tree (n,), its first axis (n, 3)."""
-    anchors: list[np.ndarray] = []
-    depths: list[int] = []
-    for parent, offset in zip(tree.parent, tree.offset):
-        anchors.append(np.add(offset, anchors[parent] if parent >= 0 else 0.0))
-        depths.append(depths[parent] + 1 if parent >= 0 else 0)
-    axes = [tree.axis[joint.qd.start] for joint in tree.coordinates.joints]
-    return np.array(anchors), np.array(depths), np.array(axes)
-
-
-def named_with_kind(tree: tmt.Tree, joints: Sequence[int]) -> list[str]:
-    """Some joints with their kind: "wrist (hinge)"; the parts of a free joint as that one."""
-    of_free: dict[int, str] = {}
-    for first in free_joints(tree):
-        name = tree.joint_names[first]
-        of_free |= dict.fromkeys(range(first, first + len(FREE)), name.removesuffix(" x"))
-    names = []
-    for joint in joints:
-        named = f"{tree.joint_names[joint]} ({tree.kind[joint]})"
-        names.append(f"{of_free[joint]} (free)" if joint in of_free else named)
-    return list(dict.fromkeys(names))
-
-
-def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
-    """Unmatched, if a joint is missing, additional, or of another kind."""
-    wrong = []
-    for i, j in sorted(pairs.items()):
-        if reference.kind[i] != tree.kind[j]:
-            expected = f"expected a {reference.kind[i]} as in {whose}"
-            wrong.append(f"joint {tree.joint_names[j]} is a {tree.kind[j]}, {expected}")
-    for word, joints, matched in (("missing", reference, pairs.keys()), ("additional", tree, pairs.values())):
-        left = [k for k in range(len(joints.joint_names)) if k not in matched]
-        if left:
-            wrong.append(f"{word} joints: {some_of(named_with_kind(joints, left))}")
-    if wrong:
-        raise Unmatched("; ".join(wrong))

@@ -1,13 +1,14 @@
-"""Where the frames of a file may lie without another motion: the stated robot, moved and turned with gravity.
+"""Two files of one robot: which joints are the same, and where frames may lie without another motion.
 
-The anchor of a hinge may lie anywhere on its axis, that of a slide anywhere; frames may be parallel at any
-position of the joints.
+Joints are the same by name, else by their order among those of their kind. The anchor of a hinge may lie anywhere
+on its axis, that of a slide anywhere: the stated ones are put at the foot of the perpendicular from the file's.
+Frames may be parallel at any position of the joints, and the robot with its gravity may be moved and turned.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,72 @@ import tmt
 from tmt.derivation.method import joint_frames
 
 from ..core.finding import Finding
-from .joint_map import places_of
+from ..core.words import some_of
+from .coordinates import FREE, free_joints
 
 SAME = 1e-9  # of the length of a vector: one that is the same within rounding
 MOST_AXES = 6  # of the first joints: pairs of them are tried
+
+
+class Unmatched(ValueError):
+    """Some joints have no counterpart; the message names them."""
+
+
+class Matched(NamedTuple):
+    """The joints of a file."""
+
+    names: tuple[str, ...]  # in the order of the reference's joints
+    renamed: tuple[str, ...]  # "wrist as hand": not matched by name
+
+
+def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
+    """The joints of a tree for those of a reference: by name, else by their order. Unmatched, if one is left."""
+    pairs = same_names(reference.joint_names, tree.joint_names)
+    left = [j for j in range(len(tree.joint_names)) if j not in pairs.values()]
+    for i, kind in enumerate(reference.kind):
+        alike = [j for j in left if tree.kind[j] == kind]
+        if i not in pairs and alike:
+            pairs[i] = alike[0]
+            left.remove(alike[0])
+    refuse_unmatched(reference, tree, pairs, whose)
+    names = tuple(tree.joint_names[pairs[i]] for i in range(len(reference.joint_names)))
+    renamed = [f"{name} as {right}" for name, right in zip(names, reference.joint_names) if name != right]
+    return Matched(names, tuple(renamed))
+
+
+def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]:
+    """Joints of the same name, also with other capital letters: {index: index}."""
+    pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
+    lower, right = [name.casefold() for name in names], [name.casefold() for name in reference]
+    for i, name in enumerate(right):
+        is_only_one = lower.count(name) == right.count(name) == 1
+        if i not in pairs and is_only_one and lower.index(name) not in pairs.values():
+            pairs[i] = lower.index(name)
+    return pairs
+
+
+def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
+    """Unmatched, if a joint is missing, additional, or of another kind."""
+    wrong = []
+    for i, j in sorted(pairs.items()):
+        if reference.kind[i] != tree.kind[j]:
+            expected = f"expected a {reference.kind[i]} as in {whose}"
+            wrong.append(f"joint {tree.joint_names[j]} is a {tree.kind[j]}, {expected}")
+    for word, joints, matched in (("missing", reference, pairs.keys()), ("additional", tree, pairs.values())):
+        left = [k for k in range(len(joints.joint_names)) if k not in matched]
+        if left:
+            wrong.append(f"{word} joints: {some_of(named_with_kind(joints, left))}")
+    if wrong:
+        raise Unmatched("; ".join(wrong))
+
+
+def named_with_kind(tree: tmt.Tree, joints: Sequence[int]) -> list[str]:
+    """Some joints with their kind: "wrist (hinge)"; the parts of a free joint as that one."""
+    named = {i: f"{name} ({kind})" for i, (name, kind) in enumerate(zip(tree.joint_names, tree.kind))}
+    for first in free_joints(tree):
+        free = f"{tree.joint_names[first].removesuffix(' x')} (free)"
+        named |= dict.fromkeys(range(first, first + len(FREE)), free)
+    return list(dict.fromkeys(named[joint] for joint in joints))
 
 
 @dataclass(frozen=True)
@@ -60,42 +123,46 @@ class Placement:
 
 
 def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
-    """The stated Tree, moved and turned such that most of its vectors are those of a file's Tree."""
+    """The stated Tree, drawn at the file's `ref`, turned and moved, where more of its vectors are the file's then."""
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
-    reference = [tree.reference[joint] for joint in joints]
-    drawn = tuple(name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b)
-    vectors = vectors_of(tree, joints)
-    turn, most = turned(vectors_of(stated, range(len(joints))), vectors)
-    there = drawn_at(stated, reference) if drawn else stated
-    other_turn, count = turned(vectors_of(there, range(len(joints))), vectors)
-    if count > most:
-        stated, turn = there, other_turn
-    else:
-        drawn = ()
-    before, _, axes = places_of(stated)
-    anchors, wanted = before @ turn.T, places_of(tree)[0][joints]
-    free = [directions(kind, axis) for kind, axis in zip(stated.kind, axes @ turn.T)]
-    tolerance = SAME * max(1.0, np.abs(anchors).max(), np.abs(wanted).max())
-    shift = shifted(anchors, wanted, free, tolerance)
-    moved, along = anchors + shift, []
-    for i, (name, projection) in enumerate(zip(stated.joint_names, free)):
-        apart = wanted[i] - moved[i]
-        is_on_axis = np.abs(apart - projection @ apart).max() <= tolerance
-        if is_on_axis and np.abs(apart).max() > tolerance:
-            moved[i] += projection @ apart
-            along.append(name)
-    if along or shift.any() or (turn != np.eye(3)).any():
-        at = list(stated.body_joint)
-        centres = (before[at] + np.array(stated.com)) @ turn.T + shift
-        turns, gravity = np.array([turn] * len(at)), tuple((turn @ stated.gravity).tolist())
-        stated = with_frames(stated, moved, np.array(stated.axis) @ turn.T, centres, turns, gravity=gravity)
-    is_with_gravity = bool(same_vectors(np.array([stated.gravity]), np.array([tree.gravity]))[0])
-    return Placement(stated, turn, shift, tuple(along), drawn, is_with_gravity)
+    reference = tuple(tree.reference[joint] for joint in joints)
+    differs = [name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b]
+    wanted, most, there = vectors_of(tree, joints), -1, stated
+    for drawn in ((), tuple(differs))[: 1 + bool(differs)]:
+        robot = drawn_at(stated, reference) if drawn else stated
+        vectors = vectors_of(robot, range(len(joints)))
+        for turn in (np.eye(3), *rotations(vectors, wanted)):
+            if (count := same_vectors(vectors @ turn.T, wanted).sum()) > most:
+                most, found, there = count, (drawn, turn), robot
+    drawn, turn = found
+    anchors, axes = places_of(there)
+    centres = (anchors[list(there.body_joint)] + np.array(there.com)) @ turn.T
+    anchors, axes, others = anchors @ turn.T, axes @ turn.T, places_of(tree)[0][joints]
+    free = np.array([directions(kind, axis) for kind, axis in zip(there.kind, axes)])
+    tolerance = SAME * max(1.0, np.abs(anchors).max(), np.abs(others).max())
+    shift = shifted(anchors, others, free, tolerance)
+    to_foot = np.einsum("nij,nj->ni", free, others - anchors - shift)
+    is_along = np.abs(to_foot).max(axis=1) > tolerance
+    if is_along.any() or shift.any() or (turn != np.eye(3)).any():
+        turns, gravity = np.array([turn] * len(centres)), tuple((turn @ there.gravity).tolist())
+        feet, axes = anchors + shift + to_foot * is_along[:, None], np.array(there.axis) @ turn.T
+        there = with_frames(there, feet, axes, centres + shift, turns, gravity=gravity)
+    along = tuple(name for name, is_it in zip(there.joint_names, is_along) if is_it)
+    is_with_gravity = bool(same_vectors(np.array([there.gravity]), np.array([tree.gravity]))[0])
+    return Placement(there, turn, shift, along, drawn, is_with_gravity)
+
+
+def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray]:
+    """The anchor of each joint in the world, m, and its first axis, (n, 3) each."""
+    anchors: list[np.ndarray] = []
+    for parent, offset in zip(tree.parent, tree.offset):
+        anchors.append(np.add(offset, anchors[parent] if parent >= 0 else 0.0))
+    return np.array(anchors), np.array([tree.axis[joint.qd.start] for joint in tree.coordinates.joints])
 
 
 def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
     """Vectors that turn with a robot, (k, 3): axes, distances of anchors, centres of mass; gravity last."""
-    anchors, _, axes = (values[list(joints)] for values in places_of(tree))
+    anchors, axes = (values[list(joints)] for values in places_of(tree))
     centres = np.zeros_like(anchors)
     for mass, joint, com in zip(tree.mass, tree.body_joint, tree.com):
         centres[list(joints).index(joint)] += np.multiply(mass, com)
@@ -131,23 +198,9 @@ def with_frames(
     return replace(tree, **numbers, **more)
 
 
-def turned(vectors: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, int]:
-    """The rotation, (3, 3), by which most vectors, (k, 3), are the others, and how many are.
-
-    It is the identity unless another one makes more of them so.
-    """
-    best, turn = same_vectors(vectors, others).sum(), np.eye(3)
-    for candidate in rotations(vectors, others):
-        same = same_vectors(vectors @ candidate.T, others)
-        if same.sum() > best:
-            best, turn = same.sum(), candidate
-    return turn, int(best)
-
-
 def same_vectors(vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Whether each of some vectors, (k, 3), is the other within rounding."""
-    lengths = np.linalg.norm(vectors, axis=1)
-    return np.abs(vectors - others).max(axis=1) <= SAME * lengths
+    return np.abs(vectors - others).max(axis=1) <= SAME * np.linalg.norm(vectors, axis=1)
 
 
 def rotations(vectors: np.ndarray, others: np.ndarray) -> Iterator[np.ndarray]:
@@ -175,18 +228,12 @@ def directions(kind: str, axis: np.ndarray) -> np.ndarray:
     return np.outer(axis, axis) if kind == "hinge" else np.zeros((3, 3))
 
 
-def shifted(
-    anchors: np.ndarray, others: np.ndarray, free: Sequence[np.ndarray], tolerance: float
-) -> np.ndarray:
+def shifted(anchors: np.ndarray, others: np.ndarray, free: np.ndarray, tolerance: float) -> np.ndarray:
     """The shift, (3,) m, with which most anchors, (n, 3), are the others apart from free directions, or 0."""
 
     def count(shift: np.ndarray) -> int:
         apart = others - anchors - shift
-        left = [vector - projection @ vector for vector, projection in zip(apart, free)]
+        left = apart - np.einsum("nij,nj->ni", free, apart)
         return int((np.abs(left).max(axis=1) <= tolerance).sum())
 
-    best, chosen = count(np.zeros(3)), np.zeros(3)
-    for shift in (others - anchors)[:MOST_AXES]:
-        if count(shift) > best:
-            best, chosen = count(shift), shift
-    return chosen
+    return max([np.zeros(3), *(others - anchors)[:MOST_AXES]], key=count)  # the first of the best

@@ -20,8 +20,8 @@ from ..robots import Robot
 from ..robots.arm import ARM
 from ..robots.case import SEED
 from ..robots.file import not_compared, robot_of, robot_of_solution
-from ..robots.joint_map import JointsError, Matched, Unmatched, joint_map, matched_joints
-from ..robots.placement import placed
+from ..robots.joint_map import JointsError, joint_map
+from ..robots.placement import Matched, Unmatched, matched_joints, placed
 
 REFERENCES = {"arm": "the stated numbers", "model": "tmt's equations for the model as compiled"}
 SOLUTION = "solution"  # the kind of reference that is another file

@@ -11,7 +11,7 @@ import numpy as np
 import tmt
 
 from ...robots.file import RobotFile
-from ...robots.joint_map import places_of
+from ...robots.placement import places_of
 from .actuators import drive_of
 from .engine import Mujoco
 from .inventory import features, refuse, refuse_numbers, take_away, usable_keys

@@ -20,7 +20,7 @@ from ...engines.mujoco.parameters import STATED_FLAGS, Stated, lengths, paramete
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.coordinates import Coordinates
-from ...robots.joint_map import places_of
+from ...robots.placement import places_of
 from .. import Experiment
 from ..setup import Setup
 from .causes import causes_of
@@ -126,7 +126,7 @@ def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict[str, Any]:
     """The numbers of a Tree by quantity, for these joints, their speeds and positions, and bodies."""
-    anchors, _, _ = places_of(tree)
+    anchors, _ = places_of(tree)
     places = [tree.coordinates.joints[j] for j in joints]
     counts = [place.q.stop - place.q.start for place in places]
     positions, speeds = np.r_[tuple(place.q for place in places)], np.r_[tuple(place.qd for place in places)]
