@@ -103,7 +103,7 @@ class WriteOptions(Options):
         if self.write is None or reading is None:
             return options
         from ..engines.mujoco import Source
-        from ..engines.mujoco.smaller import MARK
+        from ..engines.mujoco.written import MARK
         from ..process.files import assets_of, why_not
         from ..report.folder import OWN
 

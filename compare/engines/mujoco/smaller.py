@@ -2,8 +2,6 @@
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from hashlib import sha256
-from pathlib import Path as File
 from typing import Any
 
 import mujoco
@@ -13,7 +11,6 @@ from scipy.sparse.csgraph import connected_components
 from tmt.export.parameters import PAYLOAD, SIZES, Parameters
 from tmt.model.tree import Tree
 
-from ...process.files import assets_of
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Use, joints
 from .names import bit, element_name, kind_of, parts_of
@@ -23,7 +20,6 @@ NAMED = {  # the elements that are known by their names, and their kinds in a co
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
     "equalities": "equality", "sites": "site", "bodies": "body",
 }  # fmt: skip
-MARK = "Written by python -m compare reduction"  # in the first line of each file
 OFF = int(mujoco.mjtLimited.mjLIMITED_FALSE)
 DRAWN = "skins", "lights", "cameras"
 REPORTED = int(mujoco.mjtEnableBit.mjENBL_ENERGY) | int(mujoco.mjtEnableBit.mjENBL_FWDINV)
@@ -66,33 +62,6 @@ class Smaller:
         for element in needless:
             self.spec.delete(element)
         return len(needless)
-
-    def write(self, path: File, comment: str) -> None:
-        """Write the file, by MuJoCo with six digits; meshes and height fields go into a folder beside it.
-
-        Its first line says that this program wrote it.
-        """
-        spec, origin = self.spec.copy(), File(self.spec.modelfiledir or ".").absolute()
-        folder = assets_of(path)
-        for asset in files_of(spec):
-            name = File(asset.file).name
-            places = origin / spec.meshdir / asset.file, origin / spec.meshdir / name, origin / asset.file
-            content = next(filter(File.is_file, places), places[0]).read_bytes()
-            folder.mkdir(exist_ok=True)
-            asset.name = asset.name or File(asset.file).stem
-            asset.file = f"{folder.name}/{sha256(content).hexdigest()[:8]} {name}"  # others of it stay
-            (path.parent / asset.file).write_bytes(content)
-        spec.comment = comment.replace("--", "- -")  # which XML does not allow
-        spec.modelfiledir, spec.meshdir, spec.strippath = str(path.absolute().parent), "", False
-        spec.texturedir = str(origin / spec.texturedir) if spec.textures else ""
-        with warnings.catch_warnings(action="ignore"):
-            compiled(spec)
-            path.write_text(f"<!-- {MARK} -->\n{spec.to_xml()}", encoding="utf-8")
-
-
-def files_of(spec: mujoco.MjSpec) -> list[mujoco.MjsMesh | mujoco.MjsHField]:
-    """The meshes and height fields that are read from files."""
-    return [asset for asset in (*spec.meshes, *spec.hfields) if asset.file]
 
 
 def drawing(small: Smaller, use: Use) -> int:

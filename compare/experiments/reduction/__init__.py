@@ -18,7 +18,8 @@ from ...core.timing import fastest
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.motion import Scene
 from ...engines.mujoco.reading import Reading, read
-from ...engines.mujoco.smaller import Smaller, files_of, of_parts
+from ...engines.mujoco.smaller import Smaller, of_parts
+from ...engines.mujoco.written import files_of
 from ...judge.agree import closest, worst_of_each
 from ...judge.entries import Entries
 from ...judge.run import movement_unit
@@ -111,15 +112,9 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
         "allowed": allowed,
     }
     with draft_of(Path(write) if write else None) as draft:
-        while True:  # until an error that six digits make is allowed, too
-            names, model, _ = locks.models[-1]
-            comment = block(TEXT, "comment", about=made, names=names, command=setup.command)
-            error = scene.error(written(scene, names, draft, comment), from_keys=True)
-            if error <= allowed or not names:
-                break
-            locks.models.pop()
-        if not (names or write):
-            error = 0.0  # without six digits
+        names, model, _ = locks.models[-1]
+        comment = block(TEXT, "comment", about=made, names=names, command=setup.command)
+        error = scene.error(written(scene, names, draft, comment), from_keys=True)
         add_checks(result, scene, locks, error, allowed)
         is_written = bool(write) and all(check.passed for check in result.checks)
         if write and is_written:

@@ -11,6 +11,7 @@ from ...engines.mujoco.motion import Path, Scene, joints
 from ...engines.mujoco.names import kind_of
 from ...engines.mujoco.smaller import FREE, Smaller, finished, locked, tied_joints
 from ...engines.mujoco.source import Source
+from ...engines.mujoco.written import write
 from .records import FreeRow, JointRow
 
 TEXT = "reduction"  # the template
@@ -113,5 +114,5 @@ def starts(scene: Scene) -> dict[str, tuple[float, ...]]:
 def written(scene: Scene, names: Sequence[str], path: File, comment: str) -> Smaller:
     """Write what is left with joints locked, with the starts of the motions as keyframes; what is read again."""
     small = locked(scene.left, {name: scene.use.middle[name] for name in names})
-    finished(small, scene.starts(small)).write(path, comment)
+    write(finished(small, scene.starts(small)).spec, path, comment)
     return Smaller.whole(Source(path))

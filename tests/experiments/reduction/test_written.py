@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 from edited import setup_of_file
 
@@ -144,3 +145,34 @@ def test_an_earlier_file_is_whole_until_the_checks_are_made(robot, monkeypatch, 
         assert mujoco.MjModel.from_xml_path(str(path)).nmesh == 1
     assert {*tmp_path.iterdir()} == files | {tmp_path / "small_assets"}
     assert answer(robot, path) == ""
+
+
+def link(depth: int) -> str:
+    """A chain that tumbles, whose numbers have more than six digits, some of them of a default."""
+    third, more = 0.1 * depth + 1.0 / 7.0, link(depth - 1) if depth else ""
+    return f"""<body name="link {depth}" pos="{third} 0 -{third / 3}" euler="0.{depth}234567 0.1 0">
+<joint axis="0.1 1 {third}" ref="{third / 9}"/><geom type="box" size="{third / 7} 0.0{depth}123457 0.02" mass="0.{depth}9876543"/>
+<site name="tip {depth}" pos="0 {third} 0"/>{more}</body>"""
+
+
+def test_a_motion_that_multiplies_errors_is_that_of_the_written_file_too(tmp_path):
+    path, small = tmp_path / "chain.xml", tmp_path / "small.xml"
+    path.write_text(
+        f"""<mujoco><option timestep="0.0033333333" integrator="RK4"/><default><joint damping="0.000123456789"/></default>
+<worldbody>{link(4)}</worldbody><keyframe><key qvel="7.1234567 -3 2 9 -8"/></keyframe></mujoco>"""
+    )
+    result = reduction.rows(
+        replace(setup_of_file(path), alone=True, request=Request(write=str(small), error=1e-9))
+    )
+    assert told(result) == str(small) and all(check.passed for check in result.checks)
+    models = [mujoco.MjModel.from_xml_path(str(file)) for file in (path, small)]
+    for field in ("body_pos", "body_quat", "body_mass", "body_inertia", "jnt_axis", "qpos0", "dof_damping", "site_pos"):
+        one, other = (getattr(model, field) for model in models)
+        assert np.allclose(one, other, rtol=1e-15, atol=1e-16), field
+    ends = []
+    for model in models:
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_step(model, data, nstep=300)
+        ends.append(data.qpos.copy())
+    assert np.abs(ends[1] - ends[0]).max() < 1e-9

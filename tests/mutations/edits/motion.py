@@ -54,7 +54,6 @@ EDITS = (
     ("reduction", "add_file", "verdict and verdict.why", "False", "a file that is not stable is reduced"),
     ("reduction", "add_checks", "scene.error(_1)", "0.0", "what is taken out may move"),
     ("reduction", "add_file", "from_keys=True", "from_keys=False", "no keyframe of the written file is run"),
-    ("reduction", "add_file", "error <= allowed or not names", "True", "digits may make more than the error"),
     ("reduction", "compare_locked", "(tree, smaller)", "(tree, tree)", "the smaller model is not asked"),
     ("reduction", "compare_locked", "closest(_1, _2)", "(0,)", "the first state is judged"),
     ("reduction", "compare_locked", "FACTOR * _1", "100 * FACTOR * _1", "tolerance x 100"),
