@@ -162,7 +162,7 @@ def test_a_motion_that_multiplies_errors_is_that_of_the_written_file_too(tmp_pat
 <worldbody>{link(4)}</worldbody><keyframe><key qvel="7.1234567 -3 2 9 -8"/></keyframe></mujoco>"""
     )
     result = reduction.rows(
-        replace(setup_of_file(path), alone=True, request=Request(write=str(small), error=1e-9))
+        replace(setup_of_file(path), alone=True, options=ReductionOptions(write=str(small), error=1e-9))
     )
     assert told(result) == str(small) and all(check.passed for check in result.checks)
     models = [mujoco.MjModel.from_xml_path(str(file)) for file in (path, small)]
