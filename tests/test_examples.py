@@ -19,13 +19,15 @@ from compare.agreement import Difference
 from compare.fleet.models import place_of_report
 
 EXAMPLES = sorted((ROOT / "tests" / "examples").glob("*.py"))
-SLOW = {"many_files": pytest.mark.slow}  # which starts runs
+SLOW = dict.fromkeys(("many_files", "first_hour"), pytest.mark.slow)  # which start runs
 TABLE = ROOT / "reports" / "example" / "tables" / "speed.csv"
 GIVEN = {"time_against_error": [TABLE], "marks": ["class"]}
 # what is printed, and the files that are left
 EXPECTED = {
     "controller": (r"after 2 s: 0\.00\d* deg", set()),
     "exported_c": (r"difference from tmt: \d(\.\d)?e-1\d|difference from tmt: 0$", {"arm.c", "arm.h", "arm.so"}),
+    "first_hour": (r"^h\[hip\]: .*\n.* h\[hip\], coefficient of knee'\^2: yours is -1 times(.*\n)+the equations agree\n(.*\n)+"
+                   r" RK4 +1[12]0 ms(.*\n)+time over error: mujoco, tmt$", {"robot.xml", "report", "time_over_error.png"}),
     "many_files": (r"status 1.*\n.*ben.xml: differ com z of rod.*\n.*anna.xml: agree$",
                    {"class", "solution.xml", "submissions"}),
     "marks": (r"anna.xml: 7 of 7\n/submitted/ben.xml: 3 of 7\ncopy.xml: 7 of 7\nbroken.xml: 0 of 7$", {"class"}),
@@ -68,7 +70,21 @@ def test_an_example_runs_and_says_what_it_finds(path, tmp_path, monkeypatch, cap
     assert err == "" and re.search(printed, out, re.MULTILINE), out
     assert {file.name for file in tmp_path.iterdir()} == left
     text = path.read_text(encoding="utf-8")
-    assert len(text.partition('"""\n')[0].splitlines()) == 2 and len(text.splitlines()) <= 40
+    is_notebook = path.with_suffix(".ipynb").exists()
+    assert is_notebook or (len(text.partition('"""\n')[0].splitlines()) == 2 and len(text.splitlines()) <= 40)
+
+
+def test_the_notebook_has_the_cells_of_its_source():
+    """As jupytext pairs them: a cell begins with "# %%", and its text, if it is Markdown, is in comments."""
+    source = ROOT / "tests" / "examples" / "first_hour.py"
+    cells = json.loads(source.with_suffix(".ipynb").read_text(encoding="utf-8"))["cells"]
+    parts = re.split(r"(?m)^# %%", source.read_text(encoding="utf-8"))[1:]
+    assert len(parts) == len(cells) and not any(cell.get("outputs") for cell in cells)
+    for part, cell in zip(parts, cells):
+        head, _, body = part.partition("\n")
+        is_text = "[markdown]" in head
+        text = re.sub(r"(?m)^# ?", "", body) if is_text else body
+        assert "".join(cell["source"]) == text.strip("\n") and (cell["cell_type"] == "markdown") == is_text
 
 
 SECTION = re.compile(r"(?ms)^ *(?:Parameters|Attributes)\n *-+\n(.*?)(?=\n *\n *\w+\n *-+\n|\Z)")
