@@ -33,11 +33,9 @@ def script(report: Report) -> str:
 
 def worst_states(rows: Sequence[Any], plain: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The worst state of each quantity of an experiment."""
-    found = []
+    found, compared = [], [row for row in rows if hasattr(row, "worst_entry") and row.worst_difference is not None]
     for quantity in QUANTITIES:
-        of_quantity = [row for row in rows if getattr(row, "quantity", "") == quantity]
-        known = [row for row in of_quantity if getattr(row, "worst_difference", None) is not None]
-        if known:
+        if known := [row for row in compared if row.quantity == quantity]:
             found.append(state(max(known, key=lambda row: row.difference_over_bar or 0.0), plain))
     return found
 

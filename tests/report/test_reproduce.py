@@ -9,8 +9,12 @@ import pytest
 from in_process import without_workers
 from models import PATHS
 from runs import ROOT
+from sections import GOOD, section
 
 from compare.__main__ import main
+from compare.report.reproduce import script
+from compare.report.verdict import Report
+from compare.robots.arm import ARM
 
 # what the script may not need: this project, and all that it is built on but MuJoCo and NumPy
 ALONE = """
@@ -140,6 +144,13 @@ def test_a_wrong_number_of_the_report_is_found(name, runs):
     status, lines = repeated(script)
     path.write_text(text, encoding="utf-8")
     assert status == 1 and sum("not in results.json" in line for line in lines) == 1
+
+
+def test_rows_that_have_no_worst_state_are_left_out():
+    """Those of another engine have quantities of the same names."""
+    of = section("engines", GOOD, rows=[{"quantity": "Mbar", "worst_difference": 1.0}])
+    said = script(Report([of], ARM, {"command": "c"}, "", plain={"why": "", "zero": None, "mass_alone": False}))
+    assert '"states": []' in said and compile(said, "reproduce.py", "exec")
 
 
 def test_a_file_that_mujoco_alone_reads_otherwise_is_said(tmp_path, capsys):
