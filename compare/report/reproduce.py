@@ -33,11 +33,9 @@ def script(report: Report) -> str:
 
 def worst_states(rows: Sequence[Any], plain: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The worst state of each quantity of an experiment."""
-    found, compared = [], [row for row in rows if hasattr(row, "worst_entry") and row.worst_difference is not None]
-    for quantity in QUANTITIES:
-        if known := [row for row in compared if row.quantity == quantity]:
-            found.append(state(max(known, key=lambda row: row.difference_over_bar or 0.0), plain))
-    return found
+    compared = [row for row in rows if hasattr(row, "worst_entry") and row.worst_difference is not None]
+    groups = ([row for row in compared if row.quantity == quantity] for quantity in QUANTITIES)
+    return [state(max(group, key=lambda row: row.difference_over_bar or 0.0), plain) for group in groups if group]
 
 
 def state(row: Any, plain: Mapping[str, Any]) -> dict[str, Any]:
