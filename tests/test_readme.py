@@ -23,8 +23,16 @@ def test_it_is_short_and_has_all_that_it_links():
     assert BLOCKS and {language for language, _ in BLOCKS} <= {"python", "sh", "text", "toml"}
     assert len(BLOCKS) == README.count("\n```") / 2 and len(README.splitlines()) <= 150
     linked = re.findall(r"\]\(([^)]+)\)", README)
-    assert len([name for name in linked if name.endswith((".png", ".gif"))]) == 2
+    pictures = [ROOT / name for name in linked if name.endswith((".png", ".gif"))]
+    assert len(pictures) == 2 and (ROOT / "reports" / "page.png").stat().st_size < 150_000
     assert all((ROOT / name).exists() for name in linked)
+    prose = re.sub(r"(?ms)^```.*?^```$", "", README)
+    assert len(re.findall(r"\S*\w\S*", prose)) <= 900
+
+
+def test_the_example_workflow_runs_what_the_readme_shows():
+    text = (ROOT / ".github" / "example" / "models.yml").read_text(encoding="utf-8")
+    assert re.findall(r"run: (python -m compare .*)", text) == re.findall(r"(?m)^python -m compare all .*urdf .*$", README)
 
 
 def table(name):
@@ -48,7 +56,7 @@ def test_its_figures_are_those_of_the_example():
     free = [row for row in table("trajectory") if row["scene"].endswith(", free")]
     followed = {"engine": "mujoco", "method": "RK4", "dt_s": "0.078125", "scene": "ball catch, free"}
     (error,) = [float(row["worst_error_rad"]) for row in table("speed") if followed.items() <= row.items()]
-    text = " ".join(README.partition("## The result")[2].split())
+    text = " ".join(README.partition("## The arm, the assignment")[2].split())
     for figure in (
         f"{len(results['checks'])} checks", f"{largest(table('mass'), quantity='Mbar', scene='random states'):.1e} kg m2",
         f"{largest(table('acceleration'), quantity='qdd', scene='random states'):.1e} rad/s2", worst,
