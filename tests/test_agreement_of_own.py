@@ -82,7 +82,8 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
         "acceleration": scale.acceleration(scale.force(states["tau"]), values["acceleration"]),
     }[name]  # fmt: skip
     at = (7, *(1,) * (values[name].ndim - 1))
-    allowed = (FACTOR * EPS + rtol) * np.broadcast_to(of_name, values[name].shape)[at]
+    largest = np.abs(values[name]).max(axis=0)[at[1:]]  # of MuJoCo's, about
+    allowed = FACTOR * EPS * np.broadcast_to(of_name, values[name].shape)[at] + rtol * largest
     for share in (0.99, 1.01):
         changed = values[name].copy()
         changed[at] += share * allowed
@@ -97,6 +98,44 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
 def advised(mjcf=PENDULUM, **brought):
     _, found, rtol = message_of(mjcf, **brought).partition("state rtol=")
     return float(rtol.split()[0].rstrip(".")) if found else None
+
+
+FOUR_BAR = """<mujoco model="bar"><worldbody><body name="crank"><joint name="crank" axis="0 1 0"/>
+  <inertial pos="0 0 -0.1" mass="1" diaginertia=".01 .01 .01"/><body name="coupler" pos="0 0 -0.2">
+  <joint name="turn" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia=".01 .01 .01"/></body></body></worldbody>
+  <equality><connect name="pin" body1="coupler" body2="world" anchor="0.3 0 0"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize("brought", [
+    {"mass_matrix": lambda q: [[0.3]]}, {"mass_matrix": np.ones((3, 1, 1)), "q": np.zeros((3, 2))},
+    {"mass_matrix": np.ones((3, 1, 1)), "q": np.zeros((3, 1))},
+])  # fmt: skip
+def test_equations_of_a_closed_loop_hear_that_it_cannot_be_compared(brought):
+    with pytest.raises(ValueError, match=r"closed loop cannot be compared by joint coordinates.*") as caught:
+        compare.assert_agrees(FOUR_BAR, **brought)
+    assert "1 equality constraint (pin)" in str(caught.value)
+
+
+def test_a_function_is_called_once_at_each_state():
+    states = []
+
+    def counted(q, qd):
+        states.append((*q, *qd))
+        return bias(q, qd)
+
+    agrees(bias=counted, gravity=lambda q: counted(q, 0.0 * q), states=30)
+    assert len(states) == len(set(states)) == 60
+
+
+@pytest.mark.parametrize("share, passes", [(1e-3, True), (0.4, False)])
+def test_rtol_is_of_the_values_of_an_entry_wherever_its_terms_are(share, passes):
+    """Aloft the terms of M are large; one entry at one state of many that is off by a third of it does not pass."""
+    aloft = PENDULUM.replace("<worldbody>", '<worldbody><body pos="0 0 20">').replace("</worldbody>", "</body></worldbody>")
+    q = np.random.default_rng(4).uniform(-1.0, 1.0, (50, 2))
+    M = np.array([mass_matrix(row) for row in q])
+    M[7, 1, 1] *= 1.0 + share
+    (worst, *_) = compare.differences(aloft, mass_matrix=M, q=q, rtol=2e-3)
+    assert (worst.ratio <= 1.0) is passes and worst.entry == "M[knee][knee]"
 
 
 @pytest.mark.parametrize("height, share, rounds", [(0, 0.98e-6, 1), (0, 1.02e-6, 0), (20, 1e-3, 0)])

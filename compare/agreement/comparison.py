@@ -14,9 +14,10 @@ from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import shown
 
 from ..core.text import say
-from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations
+from ..core.words import capital
+from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations, OwnError
 from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of, state_in_words
-from ..judge.agree import share_of
+from ..judge.agree import over, share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
@@ -47,8 +48,8 @@ class Compared(NamedTuple):
 
     yours: np.ndarray
     right: np.ndarray  # MuJoCo's
-    scale: np.ndarray
-    tolerance: np.ndarray
+    rounding: np.ndarray  # 64 eps x scale
+    tolerance: np.ndarray  # with rtol
 
     @property
     def ratio(self) -> np.ndarray:
@@ -58,6 +59,12 @@ class Compared(NamedTuple):
     @property
     def fails(self) -> bool:
         return bool((self.ratio > 1.0).any())
+
+    @property
+    def least_rtol(self) -> float:
+        """The rtol with which all entries agree; NaN or inf where none does."""
+        beyond = np.maximum(np.abs(self.yours - self.right) - self.rounding, 0.0)
+        return float(over(beyond, np.broadcast_to(np.abs(self.right).max(axis=0), beyond.shape)).max())
 
 
 def origin_of(mjcf: Any) -> Any:
@@ -81,6 +88,16 @@ class Comparison:
         self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
         self.problems: list[str] = []  # other errors of the user's functions at the states, a line each
         self.read(mjcf)
+        try:
+            self.take(q, qd, tau, joints, states, seed)
+        except OwnError as error:
+            from ..engines.mujoco.parameters import closed_loop
+
+            loop = closed_loop(self.reading, "the model")  # of which equations may have fewer joints
+            raise OwnError(f"{error}. {capital(say(loop))}." if loop else str(error)) from error
+
+    def take(self, q: Any, qd: Any, tau: Any, joints: Sequence[str] | None, states: int, seed: int) -> None:
+        """The functions and the states; the user's values at these."""
         self.joints = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in self.brought.items() if is_function(value)}
         self.equations: OwnEquations | None = None  # of the user's functions, if there are any
@@ -89,10 +106,11 @@ class Comparison:
         if q is not None:
             self.take_states(q, qd, tau)
             if np.ndim(qd) and not self.qd.any() and {"bias", "acceleration"} & {*self.brought}:
-                warnings.warn("qd is 0 at all states: no velocity terms are compared", stacklevel=3)
+                warnings.warn("qd is 0 at all states: no velocity terms are compared", stacklevel=4)
             if states != DEFAULT_STATES:
                 text = f"states={shown(states)} is not used: the {len(self.q)} states of q are compared"
-                warnings.warn(text, stacklevel=3)
+                warnings.warn(text, stacklevel=4)
+            self.values  # noqa: B018  # validated
             return
         for name, value in (self.brought | {"qd": qd, "tau": tau}).items():
             if value is not None and name not in functions:
@@ -115,13 +133,13 @@ class Comparison:
                 raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
         sample, equations = random(self.robot, states, 0, seed), self.equations
         for note in sample.notes:
-            warnings.warn(say(note), stacklevel=4)
+            warnings.warn(say(note), stacklevel=5)
         assert equations is not None  # all that was brought are functions
         equations.try_at(sample.q, sample.qd, sample.tau)
         count = equations.affordable(len(sample.q), OWN_SECONDS)
         if count < len(sample.q):
             time = f"{equations.seconds:.2g} s per state"
-            warnings.warn(f"{count} states instead of {states}: your functions take {time}", stacklevel=4)
+            warnings.warn(f"{count} states instead of {states}: your functions take {time}", stacklevel=5)
         self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
     def take_states(self, q: Any, qd: Any, tau: Any) -> None:
@@ -176,13 +194,35 @@ class Comparison:
         return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
 
     @cached_property
+    def right(self) -> dict[str, np.ndarray]:
+        """MuJoCo's values of each quantity, in the model's joints."""
+        return {name: self.asked(self.mujoco, name) for name in self.values}
+
+    @cached_property
+    def roundings(self) -> dict[str, np.ndarray]:
+        """64 eps x scale of each quantity, in the model's joints."""
+        right = self.right
+        return {
+            name: FACTOR * EPS * np.broadcast_to(self.scale(name, right[name]), right[name].shape)
+            for name in right
+        }
+
+    @cached_property
+    def tolerances(self) -> dict[str, np.ndarray]:
+        """The same and rtol x the largest value that the entry has at these states."""
+        return {
+            name: self.roundings[name] + self.rtol * np.abs(right).max(axis=0)
+            for name, right in self.right.items()
+        }
+
+    @cached_property
     def compared(self) -> dict[str, Compared]:
         """Each quantity of the user and of MuJoCo."""
         compared = {}
         for name, yours in self.values.items():
-            right, own = self.asked(self.mujoco, name), self.own(name)
-            scale = np.abs(own(np.broadcast_to(self.scale(name, right), right.shape)))
-            compared[name] = Compared(own(yours), own(right), scale, self.rounding * scale)
+            own = self.own(name)
+            allowed = (np.abs(own(part[name])) for part in (self.roundings, self.tolerances))
+            compared[name] = Compared(own(yours), own(self.right[name]), *allowed)
         return compared
 
     def own(self, name: str) -> Callable[[np.ndarray], np.ndarray]:

@@ -8,8 +8,7 @@ from numpy import ndarray
 
 from ..core.finding import Finding
 from ..engines.own import QUANTITIES
-from ..judge.agree import over
-from ..judge.scale import EPS, FACTOR
+from ..judge.scale import EPS
 from .comparison import Compared, Comparison
 
 FEW = 0.15  # of the rows, at most
@@ -48,12 +47,11 @@ def slips_of_table(comparison: Comparison, name: str, compared: Compared) -> Ite
     if digits and decimals(right) is None:
         rounded = 0.5 * 10.0**-digits + rounding_of_states(comparison, name).reshape(count, -1)
         if (np.abs(yours - right) <= rounded * (1.0 + SECOND_ORDER) + tolerance).all():
-            least = over(np.abs(compared.yours - compared.right), compared.scale).max()
-            of_states = bool((rounded > 10.0**-digits).any())
-            yield slip("rounded", decimals=digits, rtol=float(f"{least:.0e}") * 2.0, of_states=of_states)
+            of_states, rtol = bool((rounded > 10.0**-digits).any()), float(f"{2.0 * compared.least_rtol:.0e}")
+            yield slip("rounded", decimals=digits, rtol=rtol, of_states=of_states)
     rows = np.flatnonzero(wrong.any(axis=1)).tolist()
     others = np.abs(yours - right)[~wrong.any(axis=1)]
-    are_exact = bool((others <= (FACTOR * EPS * compared.scale.reshape(count, -1))[~wrong.any(axis=1)]).all())
+    are_exact = bool((others <= compared.rounding.reshape(count, -1)[~wrong.any(axis=1)]).all())
     if len(rows) <= FEW * count and are_exact:
         at = np.argwhere(wrong)[:SHOWN].tolist()
         values = [(row, names[k], float(yours[row, k]), float(right[row, k])) for row, k in at]

@@ -1,5 +1,6 @@
-"""The probable cause of a difference: in Mbar and h, or in the accelerations alone."""
+"""The probable cause of a difference, of assert_agrees and of a run: in Mbar and h, or in the accelerations alone."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ from tmt import Tree, literal
 from ..core.cause import Cause
 from ..core.finding import Finding
 from ..core.text import say
-from ..diagnosis import STATES_ASKED, Stated, Values, diagnose
+from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
@@ -27,6 +28,7 @@ SECONDS_OF_CAUSE = 4.5  # of a search
 SECONDS_OF_SLOPES = 1.5  # of accelerations at several torques
 LARGER = 8.0  # times the scale: a slope is a difference of two accelerations
 CONSTANT = 1e-8  # of a factor at all states
+SINGULAR = 1e8  # the condition of a matrix that is not inverted
 
 
 class Why(NamedTuple):
@@ -34,17 +36,128 @@ class Why(NamedTuple):
 
     text: str = ""
     is_found: bool = True  # whether that is a cause
-    causes: tuple[Cause, ...] = ()  # of accelerations
+    diagnosis: Diagnosis = Diagnosis(False)  # of Mbar and h
+    forces: tuple[Cause, ...] = ()  # what else acts in the accelerations
+    force_text: str = ""  # the same in words, or what else is known of it
+    force_ratio: float = 0.0  # of a force left over to its tolerance, the largest
 
 
-class Asked(NamedTuple):
-    """The accelerations of a user that are explained, and the model that is right."""
+class Given(NamedTuple):
+    """Values at some states that are explained, in the joints of the model that is right."""
 
     tree: Tree
-    coordinates: Coordinates
-    equations: OwnEquations | None  # None: values alone
-    stated: Stated
-    rounding: float = ROUNDED
+    values: Values  # Mbar and h; NaN where they are not given
+    tau: ndarray  # (states, nv)
+    qdd: ndarray | None  # (states, nv) accelerations to explain
+    stated: Stated | None
+    rounding: float = ROUNDED  # of the scale of an entry
+    bias: Callable[[ndarray], ndarray] | None = None  # of other speeds, where there is such a function
+    mass_matrix: Callable[[ndarray], ndarray] | None = None  # of other positions
+    equations: OwnEquations | None = None  # of the user
+
+    @classmethod
+    def of(
+        cls, tree: Tree, values: Values, tau: ndarray, qdd: ndarray | None, stated: Stated,
+        equations: OwnEquations | None, rounding: float = ROUNDED,
+    ) -> "Given":  # fmt: skip
+        """A user's values; the functions that there are and that are quick are asked for more of them."""
+        is_quick = equations is not None and equations.seconds <= QUICK and equations.has("bias")
+        bias = partial(equations.bias, values.q) if equations is not None and is_quick else None
+        has_matrix = equations is not None and is_quick and equations.has("mass_matrix")
+        mass_matrix = equations.mass_matrix if equations is not None and has_matrix else None
+        return cls(tree, values, tau, qdd, stated, rounding, bias, mass_matrix, equations)
+
+    @property
+    def right(self) -> Values:
+        """The model's Mbar and h."""
+        tree, q, qd = self.tree, self.values.q, self.values.qd
+        M, h = literal.mass_matrix(tree, q), literal.bias(tree, q, qd)
+        return Values.of(tree, q, qd, M, h, self.rounding)
+
+    def left_over(self, values: Values, tau: ndarray | None = None) -> LeftOver:
+        """The force that the accelerations leave over."""
+        assert self.qdd is not None
+        return LeftOver(self.tree, values, self.tau if tau is None else tau, self.qdd, self.rounding)
+
+
+def why(given: Given) -> Why:
+    """What explains values: of Mbar and h, and of accelerations beside them; of accelerations alone where these agree."""
+    are_given = bool(np.isfinite(given.values.packed).any())
+    found = of_equations(given) if are_given else Why("", False)
+    if given.qdd is None:
+        return found
+    if not found.diagnosis.differs:
+        return of_accelerations(given)
+    if not given.values.are_finite:
+        return found
+    left_over = given.left_over(given.values)
+    if left_over.ratio <= 1.0:
+        return found._replace(force_ratio=left_over.ratio)
+    text = left_over.sentence() or say(Finding("agreement", "another"))
+    both = f"{found.text} {text}" if found.is_found else found.text
+    return found._replace(text=both, forces=left_over.causes, force_text=text, force_ratio=left_over.ratio)
+
+
+def of_equations(given: Given) -> Why:
+    """What a diagnosis finds in values of Mbar and h."""
+    values = given.values
+    asked = SECONDS_OF_CAUSE, given.bias, given.stated, given.mass_matrix
+    diagnosis = diagnose(given.tree, values, *asked)
+    if not diagnosis.differs:
+        return Why("", False, diagnosis)
+    if not diagnosis.causes and is_single(values.packed):
+        return Why(say(Finding("agreement", "single")), False, diagnosis)
+    equations, broken = given.equations, list[str]()
+    if equations and given.mass_matrix and values.are_finite and not diagnosis.causes:
+        tested = conditions(given.mass_matrix, equations.bias, equations.coordinates, values.q, values.qd)
+        broken = [condition.text for condition in tested if not condition.is_met]
+    if not diagnosis.is_symmetric:
+        names = Coordinates(given.tree.joint_names, given.tree.kind).speeds
+        broken = [symmetric(values.mass_matrix, values.tolerances[0].max(axis=(1, 2)), names).text]
+    return Why(" ".join([diagnosis.sentence(), *broken[:1]]), bool(diagnosis.causes), diagnosis)
+
+
+def is_single(values: ndarray) -> bool:
+    """Whether all numbers have single precision, and some of them need all of it."""
+    finite = values[np.isfinite(values)]
+    return bool((finite == finite.astype(np.float32)).all() and (finite != finite.astype(np.float16)).any())
+
+
+# accelerations whose Mbar and h are right, or not given
+
+
+def of_accelerations(given: Given) -> Why:
+    """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
+    right, equations = given.right, given.equations
+    left_over = given.left_over(right)
+    ratio = left_over.ratio
+    if ratio <= 1.0:
+        return Why("", False, force_ratio=ratio)
+    if left_over.causes:
+        return of_force(left_over.sentence(), left_over.causes, ratio)
+    solved = of_force(say(Finding("agreement", "solved")), (), ratio)
+    q, qd, are_given = right.q, right.qd, given.values.are_finite
+    is_asked = equations is not None and equations.has("acceleration")
+    if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
+        return solved if are_given else of_needed_forces(given, left_over)
+    affine = Affine(given.tree, equations)
+    inputs = affine.inputs(q)
+    if inputs is not None and (np.abs(inputs - np.eye(len(inputs))) > CONSTANT).any():
+        with_inputs = given.left_over(right, given.tau @ inputs.T)
+        return of_inputs(equations.coordinates.speeds, inputs, with_inputs, ratio)
+    if are_given:
+        return solved
+    values = affine.values(q, qd, given.rounding)
+    if values is None:
+        return of_needed_forces(given, left_over)
+    bias = partial(affine.bias, q, values.mass_matrix)
+    functions = (bias, given.stated, affine.mass_matrix) if equations.seconds <= QUICK else ()
+    diagnosis = diagnose(given.tree, values, SECONDS_OF_CAUSE, *functions)
+    return of_force(diagnosis.sentence(), diagnosis.causes, ratio)
+
+
+def of_force(text: str, causes: tuple[Cause, ...], ratio: float) -> Why:
+    return Why(text, bool(causes), forces=causes, force_text=text, force_ratio=ratio)
 
 
 class Affine(NamedTuple):
@@ -76,10 +189,10 @@ class Affine(NamedTuple):
         off = np.abs(acting - factors).max()
         return factors if off <= CONSTANT * (1.0 + np.abs(acting).max()) else None
 
-    def values(self, q: ndarray, qd: ndarray, rounding: float) -> "tuple[Values, partial[ndarray]] | None":
-        """The mass matrix and the bias, and the bias at other speeds; None where there is no such matrix."""
+    def values(self, q: ndarray, qd: ndarray, rounding: float) -> Values | None:
+        """The mass matrix and the bias; None where there is no such matrix."""
         slopes = self.slopes(q)
-        if not np.isfinite(slopes).all() or (np.linalg.cond(slopes) > 1e8).any():
+        if not np.isfinite(slopes).all() or (np.linalg.cond(slopes) > SINGULAR).any():
             return None
         M, scale = np.linalg.inv(slopes), Entries(self.tree, q, qd)
         size = 1.0 + scale.force()
@@ -89,35 +202,67 @@ class Affine(NamedTuple):
         allowed = LARGER * rounding * np.abs(M) @ of_slopes @ np.abs(M)
         forces = np.einsum("sij,sj->si", np.abs(M), still) + scale.force()
         of_h = np.einsum("sij,sj->si", allowed, np.abs(qdd)) + LARGER * rounding * forces
-        values = Values(q, qd, M, self.bias(q, M, qd), (allowed, of_h))
-        return values, partial(self.bias, q, M)
+        return Values(q, qd, M, self.bias(q, M, qd), (allowed, of_h))
+
+
+def of_inputs(names: tuple[str, ...], factors: ndarray, left_over: LeftOver, ratio: float) -> Why:
+    """Torques that act with other factors or elsewhere, and what else acts; left_over: with these factors."""
+    off = np.argwhere(np.abs(factors - np.eye(len(names))) > CONSTANT).tolist()
+    wrong = [(names[j], names[i] if i != j else "", float(factors[i, j])) for i, j in off]
+    about: dict[str, Any] = {"rank": 2, "kind": "input", "unit": "times"}
+    causes = tuple(
+        Cause(place=f"tau of {name}{f' at {at}' * bool(at)}", stated=float(not at), explains=x, **about)
+        for name, at, x in wrong
+    )
+    text = f"{say(Finding('agreement', 'inputs', {'factors': wrong}))} {left_over.sentence()}".rstrip()
+    found = of_force(text, causes + left_over.causes, ratio)
+    return found._replace(is_found=left_over.ratio <= 1.0 or bool(left_over.causes))
+
+
+def of_needed_forces(given: Given, left_over: LeftOver) -> Why:
+    """What explains accelerations by the forces Mbar qdd + h = tau - D qd - k (q - rest) that they need."""
+    right, qdd = left_over.values, given.qdd
+    assert qdd is not None
+    force = left_over.force + right.bias + np.einsum("sij,sj->si", right.mass_matrix, qdd)
+    alone = right._replace(bias=force, tolerances=(right.tolerances[0], left_over.tolerance))
+    diagnosis = diagnose(given.tree, alone, SECONDS_OF_CAUSE, stated=given.stated, qdd=qdd)
+    text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
+    return of_force(text, diagnosis.causes, left_over.ratio)
+
+
+# the arguments of assert_agrees
 
 
 def cause_of(comparison: Comparison) -> Why:
-    """The probable cause of what differs."""
+    """The probable cause of what differs: slips of a table, else of its equations, else one number beside noise."""
     if slips := slips_of_tables(comparison):
         return Why(" ".join(map(say, slips)))
     which = some_states(comparison)
     if len(which) < min(LEAST_STATES, len(comparison.q)):
         return Why("", False)  # too few of them are numbers
-    q, qd, tau = comparison.q[which], comparison.qd[which], comparison.tau[which]
-    yours = {name: values[which] for name, values in comparison.values.items()}
-    tree, M, h, rounding = comparison.tree, yours.get("mass_matrix"), yours.get("bias"), comparison.rounding
     failing = [name for name, compared in comparison.compared.items() if compared.fails]
-    values = Values.of(tree, q, qd, M, h, rounding)
-    if failing == ["acceleration"]:
-        asked = Asked(tree, comparison.coordinates, comparison.equations, Stated(comparison.joints), rounding)
-        why = of_accelerations(asked, values, tau, yours["acceleration"])
-        return why if why.is_found else of_noise(comparison, "acceleration") or why
-    of_h = values
-    if "gravity" in yours and ("bias" not in yours or ("gravity" in failing and "bias" not in failing)):
-        of_h = Values.of(tree, q, np.zeros_like(qd), M, yours["gravity"], rounding)
-    why = of_equations(comparison, of_h)
-    if not why.is_found and (noisy := of_noise(comparison, "bias" if of_h is values else "gravity")):
-        return noisy
-    if "acceleration" not in failing or not why.is_found or M is None or h is None:
-        return why
-    return why._replace(text=f"{why.text} {beside(comparison, values, tau, yours['acceleration'])}".rstrip())
+    yours, tolerances = ({name: part[which] for name, part in parts.items()}
+                         for parts in (comparison.values, comparison.tolerances))  # fmt: skip
+    is_gravity = "bias" not in yours or ("gravity" in failing and "bias" not in failing)
+    of_h = "gravity" if "gravity" in yours and is_gravity else "bias"
+    q, tau = comparison.q[which], comparison.tau[which]
+    qd = comparison.qd[which] * (of_h == "bias" or failing == ["acceleration"])
+    values = Values.of(comparison.tree, q, qd, yours.get("mass_matrix"), yours.get(of_h), comparison.rounding)
+    of_M = tolerances.get("mass_matrix", values.tolerances[0])
+    values = values._replace(tolerances=(of_M, tolerances.get(of_h, values.tolerances[1])))
+    qdd = yours["acceleration"] if "acceleration" in failing else None
+    about = tau, qdd, Stated(comparison.joints), comparison.equations, comparison.rounding
+    found = why(Given.of(comparison.tree, values, *about))
+    name = "acceleration" if failing == ["acceleration"] else of_h
+    return found if found.is_found else of_noise(comparison, name) or found
+
+
+def some_states(comparison: Comparison) -> ndarray:
+    """As many states as a diagnosis takes: of those with finite values the first, and the worst."""
+    ratios = [compared.ratio for compared in comparison.compared.values()]
+    worst = np.max([ratio.reshape(len(ratio), -1).max(axis=1) for ratio in ratios], axis=0)
+    finite = np.flatnonzero(np.isfinite(worst))
+    return np.unique([*finite[np.argsort(-worst[finite])[:1]], *finite[: STATES_ASKED - 1]]).astype(int)
 
 
 def of_noise(comparison: Comparison, name: str) -> Why | None:
@@ -138,101 +283,3 @@ def of_noise(comparison: Comparison, name: str) -> Why | None:
         return None
     text = say(Finding("agreement", "noisy" if found.place else "noise_alone", {"found": found}))
     return Why(text, found.place is not None)
-
-
-def some_states(comparison: Comparison) -> ndarray:
-    """As many states as a diagnosis takes: of those with finite values the first, and the worst."""
-    ratios = [compared.ratio for compared in comparison.compared.values()]
-    worst = np.max([ratio.reshape(len(ratio), -1).max(axis=1) for ratio in ratios], axis=0)
-    finite = np.flatnonzero(np.isfinite(worst))
-    return np.unique([*finite[np.argsort(-worst[finite])[:1]], *finite[: STATES_ASKED - 1]]).astype(int)
-
-
-def of_equations(comparison: Comparison, values: Values) -> Why:
-    """What a diagnosis finds in values of Mbar and h."""
-    equations, coordinates, M = comparison.equations, comparison.coordinates, values.mass_matrix
-    if equations is not None and (equations.seconds > QUICK or not equations.has("bias")):
-        equations = None  # they cannot be called some hundred times more
-    bias = partial(equations.bias, values.q) if equations is not None else None
-    mass_matrix = equations.mass_matrix if equations is not None and equations.has("mass_matrix") else None
-    stated = Stated(comparison.joints)
-    diagnosis = diagnose(comparison.tree, values, SECONDS_OF_CAUSE, bias, stated, mass_matrix)
-    if not diagnosis.differs:
-        return Why("", False)
-    if not diagnosis.causes and is_single(values.packed):
-        return Why(say(Finding("agreement", "single")), False)
-    broken = []
-    if equations is not None and equations.has("mass_matrix") and values.are_finite and not diagnosis.causes:
-        tested = conditions(equations.mass_matrix, equations.bias, coordinates, values.q, values.qd)
-        broken = [condition.text for condition in tested if not condition.is_met]
-    mirrored = symmetric(M, values.tolerances[0].max(axis=(1, 2)), coordinates.speeds)
-    if not diagnosis.is_symmetric:
-        broken = [mirrored.text]
-    return Why(" ".join([diagnosis.sentence(), *broken[:1]]), bool(diagnosis.causes))
-
-
-def is_single(values: ndarray) -> bool:
-    """Whether all numbers have single precision, and some of them need all of it."""
-    finite = values[np.isfinite(values)]
-    return bool((finite == finite.astype(np.float32)).all() and (finite != finite.astype(np.float16)).any())
-
-
-def beside(comparison: Comparison, values: Values, tau: ndarray, qdd: ndarray) -> str:
-    """What else is wrong with accelerations than the user's Mbar and h; "" where they follow from these."""
-    left_over = LeftOver(comparison.tree, values, tau, qdd, comparison.rounding)
-    if left_over.ratio <= 1.0:
-        return ""
-    return left_over.sentence() or say(Finding("agreement", "another"))
-
-
-def of_accelerations(asked: Asked, values: Values, tau: ndarray, qdd: ndarray) -> Why:
-    """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right.
-
-    values: the user's Mbar and h, as far as they are given; these are right.
-    """
-    tree, q, qd, rounding = asked.tree, values.q, values.qd, asked.rounding
-    right = Values.of(tree, q, qd, literal.mass_matrix(tree, q), literal.bias(tree, q, qd), rounding)
-    left_over = LeftOver(tree, right, tau, qdd, rounding)
-    if left_over.causes:
-        return Why(left_over.sentence(), True, left_over.causes)
-    equations, solved = asked.equations, Why(say(Finding("agreement", "solved")), False)
-    is_asked = equations is not None and equations.has("acceleration")
-    if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
-        return solved if values.are_finite else of_forces(asked, right, tau, qdd)
-    affine = Affine(tree, equations)
-    inputs = affine.inputs(q)
-    if inputs is not None and (np.abs(inputs - np.eye(len(inputs))) > CONSTANT).any():
-        return of_inputs(asked, inputs, LeftOver(tree, right, tau @ inputs.T, qdd, rounding))
-    if values.are_finite:
-        return solved
-    own = affine.values(q, qd, rounding)
-    if own is None:
-        return of_forces(asked, right, tau, qdd)
-    functions = (own[1], asked.stated, affine.mass_matrix) if equations.seconds <= QUICK else ()
-    diagnosis = diagnose(tree, own[0], SECONDS_OF_CAUSE, *functions)
-    return Why(diagnosis.sentence(), bool(diagnosis.causes), diagnosis.causes)
-
-
-def of_inputs(asked: Asked, factors: ndarray, left_over: LeftOver) -> Why:
-    """Torques that act with other factors or elsewhere, and what else acts; left_over: with these factors."""
-    names = asked.coordinates.speeds
-    off = np.argwhere(np.abs(factors - np.eye(len(names))) > CONSTANT).tolist()
-    wrong = [(names[j], names[i] if i != j else "", float(factors[i, j])) for i, j in off]
-    about: dict[str, Any] = {"rank": 2, "kind": "input", "unit": "times"}
-    causes = tuple(
-        Cause(place=f"tau of {name}{f' at {at}' * bool(at)}", stated=float(not at), explains=x, **about)
-        for name, at, x in wrong
-    )
-    text = say(Finding("agreement", "inputs", {"factors": wrong}))
-    is_found = left_over.ratio <= 1.0 or bool(left_over.causes)
-    return Why(f"{text} {left_over.sentence()}".rstrip(), is_found, causes + left_over.causes)
-
-
-def of_forces(asked: Asked, right: Values, tau: ndarray, qdd: ndarray) -> Why:
-    """What explains accelerations by the forces Mbar qdd + h = tau - D qd - k (q - rest) that they need."""
-    left_over = LeftOver(asked.tree, right, tau, qdd, asked.rounding)
-    force = left_over.force + right.bias + np.einsum("sij,sj->si", right.mass_matrix, qdd)
-    alone = right._replace(bias=force, tolerances=(right.tolerances[0], left_over.tolerance))
-    diagnosis = diagnose(asked.tree, alone, SECONDS_OF_CAUSE, stated=asked.stated, qdd=qdd)
-    text = diagnosis.sentence() if diagnosis.causes else say(Finding("agreement", "accelerations_alone"))
-    return Why(text, bool(diagnosis.causes), diagnosis.causes)

@@ -8,21 +8,20 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
-from tmt import literal
 
-from ..agreement.why import Asked, Why, of_accelerations
+from ..agreement.why import Given, Why, why
 from ..core.cause import Cause
 from ..core.check import Result
 from ..core.finding import Finding
 from ..core.rows import Row, column
 from ..core.text import block
-from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
+from ..diagnosis import STATES_ASKED, Stated, Values
 from ..diagnosis.consistency import Condition, conditions
 from ..diagnosis.forces import LeftOver
-from ..diagnosis.model import Equations, packed
+from ..diagnosis.model import ROUNDED, Equations, packed
 from ..engines import Dynamics
 from ..engines.mujoco.reading import tree_with_sites
-from ..engines.own import QUICK, OwnDynamics
+from ..engines.own import OwnDynamics
 from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
@@ -31,7 +30,6 @@ from . import Drawing, Experiment
 from .setup import Setup
 
 EXPERIMENT = Experiment(order=80, needs_file=True, states_causes=True, compares=False)
-SECONDS = 8.0  # of a search
 MOST_SAID = 3  # of causes that do the same
 POINTS = 61  # of a curve
 SECONDS_OF_CONDITIONS = 3.0
@@ -76,28 +74,27 @@ class Found(NamedTuple):
 
     engine: str
     states: int
-    of_forces: tuple[Cause, ...]  # what else acts in the accelerations
-    force_ratio: float  # of a force left over to its tolerance, the largest
-    diagnosis: Diagnosis = Diagnosis(False)  # of Mbar and h
-    ratio: float = 0.0  # of a difference of Mbar or h to its tolerance, the largest
+    why: Why
+    ratio: float | None = (
+        None  # of a difference of Mbar or h to its tolerance, the largest; None: they are not given
+    )
     conditions: Sequence[Condition] | None = ()  # on a user's own Mbar and h; None: they take too long
     curve: Curve | None = None  # of a user's own Mbar and h, where nothing explains their difference
-    alone: str | None = None  # what explains accelerations, if there is neither Mbar nor h
 
     @property
     def causes(self) -> list[Cause]:
         """The likeliest of Mbar and h, then those of accelerations."""
-        return [*self.diagnosis.causes[:MOST_SAID], *self.of_forces[:MOST_SAID]]
+        return [*self.why.diagnosis.causes[:MOST_SAID], *self.why.forces[:MOST_SAID]]
 
     @property
     def said(self) -> list[Cause]:
         """One of Mbar and h, one of accelerations: the likeliest, and in its text others that explain the same."""
-        return [one_of(causes) for causes in (self.diagnosis.causes, self.of_forces) if causes]
+        return [one_of(causes) for causes in (self.why.diagnosis.causes, self.why.forces) if causes]
 
     @property
     def share(self) -> float:
         """Of the largest difference of Mbar or h in the scale of its entry."""
-        return self.ratio * FACTOR * EPS
+        return (self.ratio or 0.0) * FACTOR * EPS
 
 
 def one_of(causes: Sequence[Cause]) -> Cause:
@@ -115,32 +112,29 @@ def diagnosed(setup: Setup) -> Found:
     if setup.reading is not None and tree == setup.reading.tree:
         tree = tree_with_sites(setup.reading)  # its numbers are said in the frames of the file
     dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
-    if isinstance(dynamics, OwnDynamics) and not dynamics.has("mass_matrix"):
-        return of_accelerations_alone(dynamics, tree, sample)
-    values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
-    own, tested = dynamics if isinstance(dynamics, OwnDynamics) else None, conditions_of(dynamics, values)
-    stated = Stated(own.equations.joints, "option") if own else None
-    is_slow = own is not None and own.equations.seconds > QUICK
-    functions = (None, stated, None) if is_slow else (partial(dynamics.bias, q), stated, dynamics.mass_matrix)
-    diagnosis = diagnose(tree, values, SECONDS, *functions)
-    right = values._replace(mass_matrix=literal.mass_matrix(tree, q), bias=literal.bias(tree, q, qd))
-    ratio = float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
-    left_over = LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau))
-    is_drawn = engine == "own" and not is_slow and diagnosis.differs and not diagnosis.causes
-    curve = telling_curve(dynamics, tree, values, right) if is_drawn else None
-    return Found(engine, len(q), left_over.causes, left_over.ratio, diagnosis, ratio, tested, curve)
+    qdd = dynamics.acceleration(q, qd, tau)
+    if not isinstance(dynamics, OwnDynamics):
+        values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
+        functions = partial(dynamics.bias, q), dynamics.mass_matrix
+        given = Given(tree, values, tau, qdd, None, ROUNDED, *functions)
+        return Found(engine, len(q), why(given), ratio_of(values, given.right))
+    equations = dynamics.equations
+    has_matrix = dynamics.has("mass_matrix")
+    of_own = (dynamics.mass_matrix(q), dynamics.bias(q, qd)) if has_matrix else (None, None)
+    values = Values.of(tree, q, qd, *of_own)
+    given = Given.of(tree, values, tau, qdd, Stated(equations.joints, "option"), equations)
+    found = why(given)
+    if not has_matrix:
+        return Found(engine, len(q), found)
+    is_drawn = given.mass_matrix is not None and found.diagnosis.differs and not found.diagnosis.causes
+    curve = telling_curve(dynamics, tree, values, given.right) if is_drawn else None
+    tested = conditions_of(dynamics, values)
+    return Found(engine, len(q), found, ratio_of(values, given.right), tested, curve)
 
 
-def of_accelerations_alone(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> Found:
-    """What explains a user's accelerations, if there is neither Mbar nor h."""
-    q, qd, tau = sample.q, sample.qd, sample.tau
-    qdd, equations = dynamics.acceleration(q, qd, tau), dynamics.equations
-    right = Values.of(tree, q, qd, literal.mass_matrix(tree, q), literal.bias(tree, q, qd))
-    ratio, why = LeftOver(tree, right, tau, qdd).ratio, Why()
-    if ratio > 1.0:
-        asked = Asked(tree, equations.coordinates, equations, Stated(equations.joints, "option"))
-        why = of_accelerations(asked, Values.of(tree, q, qd, None, None), tau, qdd)
-    return Found("own", len(q), why.causes, ratio, alone=why.text)
+def ratio_of(values: Values, right: Values) -> float:
+    """Of a difference to its tolerance, the largest."""
+    return float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
 
 
 def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Values) -> Curve:
@@ -186,14 +180,17 @@ def rows(setup: Setup) -> DiagnosisResult:
     result = DiagnosisResult("diagnosis", curve=found.curve)
     for condition in found.conditions or ():
         check(result, found, condition)
-    if found.alone is None:
-        is_known = found.diagnosis.differs or np.isfinite(found.ratio)
-        finding = result.finding("of_equations", found=found) if is_known else result.finding("no_numbers")
+    if found.ratio is not None:
+        is_known = found.why.diagnosis.differs or np.isfinite(found.ratio)
+        finding = (
+            result.finding("of_equations", found=found)
+            if is_known
+            else result.finding("no_numbers", found=found)
+        )
         check(result, found, Condition(OF_EQUATIONS, found.ratio, 1.0, "", finding))
-    is_known = np.isfinite(found.force_ratio)
-    finding = result.finding("of_forces", found=found) if is_known else result.finding("no_numbers")
-    name = OF_ACCELERATIONS if found.alone is None else ACCELERATIONS_ALONE
-    check(result, found, Condition(name, found.force_ratio, 1.0, "", finding))
+    finding = result.finding("of_forces" if np.isfinite(found.why.force_ratio) else "no_numbers", found=found)
+    name = ACCELERATIONS_ALONE if found.ratio is None else OF_ACCELERATIONS
+    check(result, found, Condition(name, found.why.force_ratio, 1.0, "", finding))
     names = [field.name for field in fields(CauseRow)]
     result.rows = [CauseRow(**{name: getattr(cause, name) for name in names}) for cause in found.causes]
     if found.conditions is None:

@@ -265,9 +265,9 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
     found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
     if found is None:
         return numbers, 0
-    is_explained = bool(found.diagnosis.causes)
+    is_explained = bool(found.why.diagnosis.causes)
     if setup.robot.is_stated and numbers:
-        is_one = is_explained and found.diagnosis.causes[0].rank < 3
+        is_one = is_explained and found.why.diagnosis.causes[0].rank < 3
         return ([found.said[0], *others], 0) if is_one else (numbers, 0)
     places = [cause.place for cause in numbers]
     searched = [cause for cause in found.said if cause.place not in places]

@@ -20,6 +20,7 @@ from .functions import QUANTITIES, STATE, OwnError, Problem, call, state_in_word
 from .own_file import aside
 
 SKEW = 1e-9  # of the largest entry: a mass matrix with a larger asymmetry is reported as not symmetric
+MOST_KNOWN = 50_000  # values that are not computed again
 DIVERGED = 2.0**49  # rad etc.: beyond it a run has diverged, and errors are not those of the equations
 
 States = Sequence[ndarray]  # q (states, nq), and qd and tau (states, nv) if needed; or of one state (nq,) ...
@@ -52,6 +53,7 @@ class OwnEquations:
         self.shapes = {name: quantity.shape_for(nv) for name, quantity in QUANTITIES.items()}  # of one state
         self.times: dict[str, float] = {}  # of one state, s, of each function that was called
         self.errors: dict[tuple[str, str], Problem] = {}  # by the quantity and what is wrong
+        self.known: dict[tuple[str | bytes, ...], ndarray] = {}  # values, by the function and the state
 
     def has(self, name: str) -> bool:
         return name in self.functions
@@ -155,17 +157,20 @@ class OwnEquations:
         """
         raised, values = np.zeros(len(states[0]), bool), dict[int, ndarray]()
         for i in range(len(raised)):
-            state, started = [part[i] for part in states], time.perf_counter()
+            state = [part[i] for part in states]
+            key = name, *(part.tobytes() for part in state)
             try:
-                values[i] = self.called(name, state)
+                if key not in self.known:
+                    self.known[key] = self.called(name, state)
+                values[i] = self.known[key]
             except OwnError as error:
                 if name not in self.times:
                     raise OwnError(f"{error}, at {state_in_words(state)}") from error
                 raised[i] = True
                 self.note(name, str(error), states, np.arange(len(raised)) == i)
                 continue
-            self.times[name] = min(self.times.get(name, np.inf), time.perf_counter() - started)
-            self.shapes[name] = values[i].shape
+        if len(self.known) > MOST_KNOWN:
+            self.known.clear()
         of_one = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
         together = np.full((len(raised), *of_one), np.nan)
         for i, value in values.items():
@@ -174,7 +179,7 @@ class OwnEquations:
 
     def called(self, name: str, state: States) -> ndarray:
         """The value of a function at one state; OwnError if it is none."""
-        copies = [np.array(part) for part in state]
+        copies, started = [np.array(part) for part in state], time.perf_counter()
         try:
             with aside(f"your {name}") if Now.is_listening else nullcontext():
                 value = self.functions[name](*copies)
@@ -187,7 +192,10 @@ class OwnEquations:
         for symbol, before, after in zip(STATE, state, copies):
             changed, row = np.array([np.any(before != after)]), [part[None] for part in state]
             self.note(name, f"changes its argument {symbol}", row, changed)
-        return functions.converted(name, value, self.shapes[name])
+        value = functions.converted(name, value, self.shapes[name])
+        self.times[name] = min(self.times.get(name, np.inf), time.perf_counter() - started)
+        self.shapes[name] = value.shape
+        return value
 
     def note(self, name: str, what: str, states: States, where: ndarray) -> None:
         """Add an error at those of the states (states, n), in the user's joints, where it occurred."""

@@ -22,9 +22,10 @@ def test_the_arm_has_nothing_to_explain(monkeypatch):
     result = diagnosis.rows(setup)
     assert failed(result) == [] and result.rows == [] and result.causes == []
     found = diagnosis.diagnosed(setup)  # a ratio of 1 is allowed
-    for k, field in enumerate(("ratio", "force_ratio")):
+    for k in range(2):  # of M and h, of the force left over
         for ratio, passes in ((1.0, True), (1.001, False)):
-            at_limit = found._replace(**{field: ratio})
+            why = found.why._replace(force_ratio=ratio) if k else found.why
+            at_limit = found._replace(why=why) if k else found._replace(ratio=ratio)
             monkeypatch.setattr(diagnosis, "diagnosed", lambda setup, at_limit=at_limit: at_limit)
             noted = diagnosis.rows(setup)
             assert noted.checks[k].passed is passes

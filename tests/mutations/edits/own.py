@@ -10,6 +10,9 @@ EDITS = (
     ("own.equations", "OwnEquations.acceleration", "forces - passive(*_1)", "forces", "damping is left out"),
     ("engines.own", "OwnDynamics.acceleration", "case.added_damping * v", "0.0 * v", "damping of a scene is left out"),
     ("engines.own", "OwnDynamics.bias", "h - self.equations.gravity_balance(q)", "h", "gravity stays on in h"),
+    ("own.equations", "OwnEquations.each", "key not in self.known", "True", "a function is called again at a state"),
+    ("agreement.comparison", "Comparison.tolerances", "np.abs(right).max(axis=0)", "self.roundings[name] / 1e-14",
+     "rtol is of the terms"),
     # joints
     ("joint_map", "JointMap.own_positions", "_1 + self.zero", "_1 - self.zero", "a zero is taken the other way"),
     ("joint_map", "JointMap.own_forces", "_1 * self.sense", "_1", "a force keeps its sense"),
@@ -61,7 +64,7 @@ EDITS = (
     ("experiments.diagnosis", "check", "result.notes.append(condition.finding)", "None", "what fails is not noted"),
     ("own.functions", "in_shape", "given == expected", "array.size == np.prod(shape)", "another order is taken"),
     ("own.equations", "OwnEquations.note", "hash(row.tobytes())", "object()", "a state counts each time it is asked"),
-    ("agreement.why", "beside", "left_over.ratio <= 1.0", "True", "a second error, in accelerations, is hidden"),
+    ("agreement.why", "why", "left_over.ratio <= 1.0", "True", "a second error, in accelerations, is hidden"),
     ("agreement.why", "cause_of", "'bias' not in failing", "False", "a wrong gravity is hidden behind a right bias"),
     ("agreement.why", "some_states", "np.flatnonzero(_1)", "np.arange(len(worst))", "causes are sought without values"),
     # of symbols, of what is asked, of tables and gears
