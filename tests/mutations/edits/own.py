@@ -32,7 +32,7 @@ EDITS = (
     ("comparison", "Comparison.take_states", "self.joints.speeds(_1)", "_1", "speeds keep their joints"),
     ("agreement", "assert_agrees", "_1 or comparison.problems", "_1", "a changed argument agrees"),
     ("agreement", "rows", "-row.ratio", "row.ratio", "the smallest ratio first"),
-    ("agreement", "rounded", "of_largest <= ROUNDED", "True", "a slip small beside the terms is rounding"),
+    ("agreement", "rounded", "worst <= ROUNDED", "True", "a slip small beside the terms is rounding"),
     ("agreement", "rounded", "worst <= ROUNDED", "True", "a small entry may be off by anything"),
     ("agreement", "message", "why.is_found or comparison.rtol", "comparison.rtol", "an rtol is advised beside a cause"),
     ("agreement", "message", "why.is_found or comparison.rtol", "why.is_found", "a larger rtol is advised than stated"),
