@@ -69,7 +69,8 @@ def carry_out(experiment: str, options: Options, command: str) -> int:
     terminal.say_lines(lines, "bold green" if report.passed else "bold red")
     for line in compared.reference.notes(is_alone and EXPERIMENTS[experiment].runs_file):
         terminal.say(line)
-    terminal.say(block("run", "report", path=page, seconds=seconds))
+    program = "reproduce.py" if (out / "reproduce.py").exists() else ""
+    terminal.say(block("run", "report", path=page, seconds=seconds, program=program))
     if options.json:
         printed = {
             "passed": report.passed,
