@@ -412,3 +412,17 @@ def test_accelerations_alone_have_a_mass_matrix_and_a_bias():
     in_degrees = lambda q, v, t: acceleration(q, v, t - [4.0, 0.0] * (q - 30.0))  # noqa: E731
     of_degrees = message_of(sprung, acceleration=in_degrees)
     assert "springref of hip: 30 rad instead of 0.5235987756 (degrees?)" in of_degrees
+
+
+@pytest.mark.parametrize("share, says", [(0.75, True), (0.5, False)])
+def test_equations_with_the_gravcomp_of_the_file_are_said_to_agree(share, says):
+    """A pendulum of 2 kg at 0.5 m, three quarters of whose weight the file takes."""
+    text = """<mujoco><worldbody><body name="bob" gravcomp="0.75"><joint name="hip" axis="0 1 0"/>
+<inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/></body></worldbody></mujoco>"""
+    with pytest.raises(AssertionError) as error:
+        compare.assert_agrees(
+            text,
+            mass_matrix=lambda q: np.full((1, 1), 0.6),
+            bias=lambda q, qd: (1.0 - share) * 9.81 * np.sin(q),
+        )
+    assert ("gravcomp of bob: with it your equations agree" in str(error.value)) == says

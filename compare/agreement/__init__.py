@@ -192,6 +192,7 @@ def message(comparison: Comparison) -> str:
     advice = None if why.is_found or comparison.rtol else rounded(comparison)
     said = [say(remark) for remark in remarks(comparison.reading, has_scenes=False)]
     values = {"comparison": comparison, "failing": failing, "why": why, "rounded": advice, "remarks": said}
+    values["compensated"] = comparison.compensated
     text = block("agreement", "message", **values, hinge=hinges[0] if hinges else "")
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
 

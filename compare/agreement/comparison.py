@@ -247,6 +247,19 @@ class Comparison:
         return {place: SYMBOLS[name] + "".join(f"[{names[i]}]" for i in place) for place in places}
 
     @property
+    def compensated(self) -> tuple[str, ...]:
+        """The bodies with gravcomp, where all that differs is that the comparison has their whole weight."""
+        bodies = [part.names for part in self.reading.features if part.feature == "gravcomp"]
+        if not bodies or not self.fails:
+            return ()
+        torque = self.mujoco.compensation(self.q, self.reading.model.body_gravcomp)
+        for name, compared in self.compared.items():
+            taken = self.own(name)(torque) if name in ("bias", "gravity") else 0.0
+            if not (np.abs(compared.yours + taken - compared.right) <= compared.tolerance).all():
+                return ()
+        return tuple(bodies[0])
+
+    @property
     def fails(self) -> bool:
         return any(compared.fails for compared in self.compared.values())
 

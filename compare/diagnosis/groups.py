@@ -74,7 +74,10 @@ def fit(search: Search, columns: ndarray) -> tuple[ndarray, ndarray]:
 def inertial_numbers(equations: Equations, search: Search) -> Iterator[Cause]:
     """The ten numbers of one body: a load on it, its tensor turned, or those of them that differ."""
     for b, columns in enumerate(body_columns(equations)):
-        added, determined = fit(search, columns)
+        tensor, is_known = fit(search, columns[4:])  # with the mass and the CoM as stated
+        added, determined = np.append(np.zeros(4), tensor), np.ones(OF_BODY, bool)
+        if not is_known.all():
+            added, determined = fit(search, columns)
         active = np.abs(columns).max(axis=(1, 2)) > 0.0
         if not determined[active].any():
             continue

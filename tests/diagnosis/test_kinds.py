@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from models import PATHS
+from scipy.spatial.transform import Rotation
 
 import tmt
 from compare.diagnosis import Stated, Values, diagnose
@@ -143,6 +144,18 @@ def test_a_tensor_about_other_axes_is_named_with_its_turn():
     tensors = [*straight.inertia[:1], about_x @ np.array(straight.inertia[1]) @ about_x.T]
     found = of_parts(straight, *parts(replace(straight, inertia=np.array(tensors).tolist())))
     assert first(found) == ("inertia of hand", "turned by rpy = (30, 0, 0) deg")
+
+
+def test_a_turned_tensor_is_named_where_no_motion_shows_the_mass_of_its_body():
+    """On a gimbal the mass, which is on no lever, has the same effect as a part of the tensor."""
+    body = '<body name="{}" pos="0 {} 0.2"><inertial pos="0 {} 0.03" mass="2" fullinertia="{}"/><joint name="{}" axis="{}"/>'
+    ring = body.format("ring", 0.1, 0.0, ".02 .03 .01 0 0 0", "pan", "0 0 1")
+    cup = body.format("cup", 0.3, 0.1, ".012 .009 .005 .001 -.0004 .0007", "tilt", "1 0 0")
+    right = tree_with_sites(reading.read(f"<mujoco><worldbody>{ring}{cup}</body></body></worldbody></mujoco>"))
+    turn = Rotation.from_euler("xyz", (20.0, 0.0, -50.0), degrees=True).as_matrix()
+    tensors = [right.inertia[0], (turn @ np.array(right.inertia[1]) @ turn.T).tolist()]
+    found = of_parts(right, *parts(replace(right, inertia=tensors)))
+    assert first(found) == ("inertia of cup", "turned by rpy = (20, 0, -50) deg")
 
 
 TENSOR = np.array(ARM.inertia[1])

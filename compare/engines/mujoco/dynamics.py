@@ -143,6 +143,15 @@ class MujocoDynamics:
         """N m, (..., nv): -qfrc_spring."""
         return self._each(lambda d: -d.qfrc_spring[self.dofs], q)
 
+    def compensation(self, q: Array, shares: np.ndarray) -> np.ndarray:
+        """N m, (..., nv): qfrc_gravcomp, where the bodies have these shares of their weight taken, (nbody,)."""
+        before = self.model.body_gravcomp.copy()
+        self.model.body_gravcomp[:] = shares
+        try:
+            return self._each(lambda d: d.qfrc_gravcomp[self.dofs], q)
+        finally:
+            self.model.body_gravcomp[:] = before
+
     def acceleration(self, q: Array, v: Array, tau: Array) -> np.ndarray:
         """a, rad/s2, (..., nv): qacc."""
         return self._each(lambda d: d.qacc[self.dofs], q, v, tau - self.constant)
