@@ -8,7 +8,7 @@ import pytest
 
 from compare.__main__ import main
 from compare.engines.mujoco import parse
-from compare.experiments import module
+from compare.experiments import functions
 from compare.process.workers import Clock
 from compare.robots.arm import ARM
 from compare.run import command
@@ -55,7 +55,7 @@ def answered(arguments, capsys) -> tuple[int, str, str]:
 @cache
 def of_arm(name):
     """The result of an experiment on the arm, every path with few states and steps."""
-    return module(name).rows(Setup.small(ARM, engines(parse(ARM.mjcf, ARM.tree))))
+    return functions(name).rows(Setup.small(ARM, engines(parse(ARM.mjcf, ARM.tree))))
 
 
 class Lines(list):

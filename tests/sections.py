@@ -11,7 +11,7 @@ from compare.report.verdict import Figure, Section
 def section(name="mass", *checks, rows=(), figures=(), kind=Result, **tables):
     """A section of plain checks (quantity, value, tolerance, rule, rounding), and what it is about if that is not the models."""
     tables = {table: typed(rows_of_table) for table, rows_of_table in tables.items()}
-    result, record = kind(name, rows=typed(rows), tables=tables), EXPERIMENTS.get(name, Experiment(0))
+    result, record = kind(name, rows=typed(rows), tables=tables), EXPERIMENTS.get(name, Experiment())
     for quantity, value, tolerance, rule, rounding, *about in checks:
         result.check("zero", quantity, value, tolerance, "kg m2", "", rounding, rule, *about)
     drawn = [Figure(file, f"Caption of {file}.") for file in figures]

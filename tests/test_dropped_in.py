@@ -1,4 +1,4 @@
-"""An experiment and an engine are one file each: dropped into the folders of a copy of the package, every command has them."""
+"""An experiment and an engine are one file and one row each: added to a copy of the package, every command has them."""
 
 import csv
 import json
@@ -13,10 +13,8 @@ PENDULUM = """<mujoco model="pendulum"><worldbody><body><joint name="hip" axis="
 <inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.02"/></body></worldbody></mujoco>"""
 ENGINE = '''"""TMT's RK4 under another name."""
 
-from ..engines import EngineRecord, Method
+from ..engines import Method
 from .tmt import Tmt
-
-ENGINE = EngineRecord(order=60, label="Twin", colour="#123456", marker="P", in_quick_runs=True)
 
 
 class Twin(Tmt):
@@ -34,9 +32,6 @@ from functools import partial
 from matplotlib.figure import Figure
 
 from ..core.check import Result
-from . import Experiment
-
-EXPERIMENT = Experiment(order=45)
 
 
 def rows(setup):
@@ -72,6 +67,15 @@ def copy(tmp_path):
     for name in ("compare", "mjcf", "tmt"):
         shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
     (root / "compare/engines/twin.py").write_text(ENGINE)
+    record = 'EngineRecord("Twin", colour="#123456", marker="P", in_quick_runs=True)'
+    for folder, before, row in (
+        ("engines", "newton", f'"twin": {record}'),
+        ("experiments", "gravity", '"trace": Experiment()'),
+    ):
+        file = root / "compare" / folder / "__init__.py"
+        text = file.read_text()
+        assert text.count(f'    "{before}": ') == 1
+        file.write_text(text.replace(f'    "{before}": ', f'    {row},\n    "{before}": '))
     (root / "compare/experiments/trace.py").write_text(EXPERIMENT)
     (root / "compare/experiments/trace.md.jinja").write_text(TEXT)
     (root / "models").mkdir()

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -32,6 +33,8 @@ def made(monkeypatch, name, **functions):
     loaders = [DictLoader({f"{name}.md.jinja": template}), environment().loader]
     monkeypatch.setattr(environment(), "loader", ChoiceLoader(loaders))
     monkeypatch.setitem(sys.modules, f"compare.experiments.{name}", SimpleNamespace(**usual | functions))
+    if name in EXPERIMENTS:  # whose functions may be another module's
+        monkeypatch.setitem(EXPERIMENTS, name, replace(EXPERIMENTS[name], module=name))
 
 
 def only(monkeypatch, *names):

@@ -1,20 +1,13 @@
-"""Records of the modules of a folder, which are read without importing the modules; that of an experiment."""
+"""The record of an experiment."""
 
-import ast
 from dataclasses import dataclass
-from operator import attrgetter
-from pathlib import Path
-from typing import TypeVar
-
-Record = TypeVar("Record")
-order_of = attrgetter("order")
 
 
 @dataclass(frozen=True)
 class Experiment:
     """What the program has to know of an experiment before it imports it."""
 
-    order: int = 0  # of `all` and of the report
+    module: str = ""  # which has its functions, if it is not the one of its name
     serves_own: bool = True  # a user's own equations; if not, the macro not_of_own says why
     asks_of_own: tuple[str, ...] | None = None  # which of a user's own functions it calls; None: all
     asks_others: bool = False  # engines beside mujoco and tmt, of which --engines has to name one
@@ -28,16 +21,3 @@ class Experiment:
     # the kinds of its `top` that are on the first screen of a run of several; the others stand in its section
     first_screen: tuple[str, ...] = ()
     runs_file: bool = False  # it asks about the file as it is, with contacts, actuators and constraints
-
-
-def records_in(folder: Path, name: str, kind: type[Record]) -> dict[str, Record]:
-    """The records `name = kind(field=literal, ...)` by the names of their modules, in their order."""
-    records = {}
-    for file in (*folder.glob("*.py"), *folder.glob("*/__init__.py")):
-        _, begins, rest = file.read_text(encoding="utf-8").partition(f"\n{name} = {kind.__name__}(")
-        if begins:
-            call = ast.parse(f"kind({rest}").body[0]
-            assert isinstance(call, ast.Expr) and isinstance(call.value, ast.Call)
-            fields = {str(field.arg): ast.literal_eval(field.value) for field in call.value.keywords}
-            records[file.parent.name if file.stem == "__init__" else file.stem] = kind(**fields)
-    return dict(sorted(records.items(), key=lambda item: order_of(item[1])))

@@ -1,11 +1,10 @@
-"""The engines: who computes. Each is one file or folder here; this module finds them by looking into its folder.
+"""The engines: who computes. Each is a row of RECORDS, and a module or a folder of its name, which is imported where it is asked.
 
-An engine is a module with a record, `ENGINE = EngineRecord(order=..., label=..., ...)`, whose fields are literals: they are read
-without importing the module. The module has
+The module has
 
     engine(schemes) -> Engine    the engine, for a robot on which MuJoCo's integrators are these schemes
 
-unless its record says from_file: run.reference makes an engine of a file of the user's.
+unless its record says from_file, where run.reference makes an engine of a file of the user's, or reads_file: see engines.outside.
 
 An engine gives the dynamics of a case; it applies gravity, damping, locked joints and torques itself. Dynamics take positions
 q (..., nq), speeds v (..., nv) and torques tau (..., nv) in rad, rad/s and N m, of any leading batch shape, with joints in the
@@ -15,15 +14,13 @@ order of the case; and Mbar a + bias = tau - D v.
 import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.records import records_in
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
 
@@ -36,7 +33,6 @@ GRID = 64  # number of equal intervals at whose ends a run is read, by default
 class EngineRecord:
     """What the program has to know of an engine before it imports it."""
 
-    order: int  # of the engines in tables and charts
     label: str  # its name in text
     possessive: str = ""  # before what it has; by default the label with 's
     colour: str = "#666666"  # in charts
@@ -44,7 +40,7 @@ class EngineRecord:
     in_quick_runs: bool = False  # a quick run measures its speed too, and a small run with more settings
     from_file: bool = False  # it is made of a user's file: of a model, or of the user's own equations
     package: str = ""  # that must be installed
-    extra: str = ""  # of this project, which installs the package; by default of the engine's name
+    extra: str = ""  # of this project, which installs the package
     reads_file: bool = False  # it reads the robot's file itself, in a process of its own: see engines.outside
     precision: str = "float64"
     environment: tuple[tuple[str, str], ...] = ()  # of that process
@@ -57,8 +53,23 @@ class EngineRecord:
         return float(np.finfo(self.precision).eps)
 
 
-_records = records_in(Path(__file__).parent, "ENGINE", EngineRecord)
-RECORDS = {name: replace(record, extra=record.extra or name) for name, record in _records.items()}
+RECORDS = {  # in the order of tables and charts
+    "mujoco": EngineRecord("MuJoCo", colour="#E69F00", marker="s", in_quick_runs=True, from_file=True),
+    "tmt": EngineRecord("TMT", colour="#0072B2", marker="o", in_quick_runs=True),
+    "scipy": EngineRecord("SciPy", colour="#009E73", marker="^"),
+    "heyoka": EngineRecord("heyoka", colour="#CC79A7", marker="D", package="heyoka", extra="taylor"),
+    "own": EngineRecord("yours", possessive="your", from_file=True),
+    "drake": EngineRecord("Drake", colour="#D55E00", marker="P", package="pydrake", extra="drake", reads_file=True),
+    "pinocchio": EngineRecord("Pinocchio", colour="#56B4E9", marker="X", package="pinocchio", extra="pinocchio", reads_file=True),
+    "mjx": EngineRecord("MJX", colour="#332288", marker="<", package="mujoco.mjx", extra="mjx", reads_file=True, compiles=True,
+                        environment=(("JAX_ENABLE_X64", "1"),)),
+    "mjx_float32": EngineRecord("MJX float32", colour="#88CCEE", marker=">", package="mujoco.mjx", extra="mjx", reads_file=True,
+                                compiles=True, precision="float32", module="mjx"),  # its usual precision
+    "warp": EngineRecord("MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp", extra="warp", reads_file=True,
+                         compiles=True, precision="float32"),
+    "newton": EngineRecord("Newton", colour="#999933", marker="h", package="newton", extra="newton", reads_file=True,
+                           precision="float32"),
+}  # fmt: skip
 LABELS = {name: record.label for name, record in RECORDS.items()}
 WHOSE = {name: record.possessive or f"{record.label}'s" for name, record in RECORDS.items()}
 COLOURS = {name: record.colour for name, record in RECORDS.items()}
@@ -262,16 +273,3 @@ def as_far_as_it_goes(t: Array, states: Array, start: Array, why: str) -> tuple[
     path[np.cumsum(~finite) > 0] = np.nan
     ended = None if finite.all() else f"at t = {t[int(np.argmin(finite)) - 1]:g} s: {' '.join(why.split())}"
     return path, ended
-
-
-def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:
-    """The first method of an engine that is the same scheme as a given one."""
-    return next(m for m in engines[engine].methods.values() if m.scheme == method.scheme)
-
-
-def one_of_each_scheme(engine: Engine) -> tuple[Method, ...]:
-    """Of methods of one engine that are the same scheme the first."""
-    first: dict[str, Method] = {}
-    for method in engine.methods.values():
-        first.setdefault(method.scheme, method)
-    return tuple(first.values())

@@ -8,14 +8,12 @@ import numpy as np
 from tmt import Tree
 
 from ..robots.coordinates import point_inertia
-from . import Array, Course, EngineRecord
+from . import Array, Course
 from .outside.bodies import Body, Link
 from .outside.file import EngineError, File, OtherJoints, OtherNames
 from .outside.model import ReadModel
 from .outside.order import ANGLES, Order, State, of_free
 
-ENGINE = EngineRecord(order=50, label="Drake", colour="#D55E00", marker="P", package="pydrake",
-                      reads_file=True)  # fmt: skip
 SCHEMES = {"RK2": (2, "runge_kutta2"), "RK3": (3, "runge_kutta3"), "RK5": (5, "runge_kutta5"),
            "implicit Euler": (1, "implicit_euler"), "Radau3": (3, "radau3")}  # fmt: skip
 ADAPTIVE, DISCRETE = " adaptive", "discrete"  # of some schemes; the plant's own step

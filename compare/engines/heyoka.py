@@ -13,11 +13,9 @@ from tmt.derivation.method import acceleration
 from tmt.derivation.vectors import cos, sign, sin, sqrt
 
 from ..robots.case import Case
-from . import Course, Engine, EngineRecord, Method, Motion, Prepared
+from . import Course, Engine, Method, Motion, Prepared
 from .scipy import ScipyDynamics, of_length_1
 
-ENGINE = EngineRecord(order=40, label="heyoka", colour="#CC79A7", marker="D", package="heyoka",
-                      extra="taylor")  # fmt: skip
 FULL = 1e-15  # tolerance: all digits of a double
 # of the accelerations: heyoka's compilation takes longer than in proportion, 15 s for 290 of them, 266 s for 2479
 MOST_OPERATIONS = 600

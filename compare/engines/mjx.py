@@ -9,17 +9,13 @@ import numpy as np
 
 from tmt import Tree
 
-from . import Array, Course, EngineRecord
+from . import Array, Course
 from .outside import as_it_runs
 from .outside.file import File
 from .outside.of_compiled import METHODS as METHODS
 from .outside.of_compiled import OfCompiled
 from .outside.order import State
 
-ENGINE = EngineRecord(
-    order=60, label="MJX", colour="#332288", marker="<", package="mujoco.mjx", reads_file=True, compiles=True,
-    environment=(("JAX_ENABLE_X64", "1"),),
-)  # fmt: skip
 # its fusions repeat what they share: an acceleration of an arm of seven hinges took 412 ms, 3 ms without them
 COMPILER = {"xla_cpu_use_fusion_emitters": False}
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from tmt import Tree
 
-from . import Array, Course, EngineRecord
+from . import Array, Course
 from .outside.bodies import Body, Link
 from .outside.file import EngineError, File, OtherJoints
 from .outside.model import ReadModel
@@ -25,8 +25,6 @@ from .warp import MOST_CONTACTS, MOST_ROWS
 from .warp import Stepper as OfWarp
 from .warp import methods_for as methods_of_warp
 
-ENGINE = EngineRecord(order=70, label="Newton", colour="#999933", marker="h", package="newton",
-                      reads_file=True, precision="float32")  # fmt: skip
 FEATHERSTONE, BY_MUJOCO = "Featherstone", "SolverMuJoCo"  # of its solvers
 UNCONSTRAINED = 0b11111  # MuJoCo's flags that disable all constraints
 OFF = "target_ke", "target_kd", "limit_ke", "limit_kd"  # actuators and limits

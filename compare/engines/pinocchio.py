@@ -5,14 +5,12 @@ A continuous joint has the cosine and the sine of its angle. Of several root bod
 
 import numpy as np
 
-from . import Array, EngineRecord
+from . import Array
 from .outside.bodies import Body, Link
 from .outside.file import File, OtherJoints, OtherNames
 from .outside.model import ReadModel
 from .outside.order import XYZW, Order, State, of_free
 
-ENGINE = EngineRecord(order=55, label="Pinocchio", colour="#56B4E9", marker="X", package="pinocchio",
-                      reads_file=True)  # fmt: skip
 METHODS: dict[str, tuple[int, str]] = {}  # it has no integrators
 FREE, COMPOSITE = "JointModelFreeFlyer", "JointModelComposite"
 

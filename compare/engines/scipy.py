@@ -9,10 +9,9 @@ from tmt.compiled import Evaluator
 
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates
-from . import Array, Course, Engine, EngineRecord, Method, Motion, OneByOne, Prepared
+from . import Array, Course, Engine, Method, Motion, OneByOne, Prepared
 from .tmt import TmtQuantities
 
-ENGINE = EngineRecord(order=30, label="SciPy", colour="#009E73", marker="^")
 DEFAULT = 1e-9  # tolerance
 LEAST_RELATIVE = 2.3e-14  # that solve_ivp takes
 NAMES = "RK45", "DOP853", "Radau", "LSODA"

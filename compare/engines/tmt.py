@@ -16,9 +16,8 @@ from tmt.simulation import reasons
 
 from ..robots.case import Case
 from ..robots.states import MOST_SPEEDS
-from . import Array, Engine, EngineRecord, Method, Motion, Prepared, Setting, Tolerance, rows_of_states
+from . import Array, Engine, Method, Motion, Prepared, Setting, Tolerance, rows_of_states
 
-ENGINE = EngineRecord(order=20, label="TMT", colour="#0072B2", marker="o", in_quick_runs=True)
 # schemes of MuJoCo that differ from others only for robots with balls, springs or a free body on its own
 FOR_SOME = ("rk4_mean_speed", "implicitfast", "discrete")
 

@@ -11,15 +11,13 @@ import numpy as np
 from tmt import Tree
 from tmt.methods import isolated_speeds
 
-from . import Array, Course, EngineRecord
+from . import Array, Course
 from .outside import as_it_runs
 from .outside.file import File
 from .outside.of_compiled import METHODS as OF_MJX
 from .outside.of_compiled import OfCompiled
 from .outside.order import State
 
-ENGINE = EngineRecord(order=65, label="MuJoCo Warp", colour="#117733", marker="p", package="mujoco_warp",
-                      reads_file=True, compiles=True, precision="float32")  # fmt: skip
 MOST_CONTACTS, MOST_ROWS = 200, 1000  # of a world in a run of the file as it is
 METHODS = OF_MJX | {"implicit": (1, "implicit"), "discrete": (1, "semi_implicit_euler")}
 

@@ -1,20 +1,18 @@
-"""The experiments: one file or folder for each word of the command line, found by looking into this folder.
+"""The experiments: a row of EXPERIMENTS for each word of the command line.
 
-An experiment is a module with a record, `EXPERIMENT = Experiment(order=..., ...)`, whose fields are literals,
-and functions: see Functions. Its text is NAME.md.jinja: a macro for its help, title, claim and tolerance, and
-for each kind of finding and caption.
+An experiment is a row and a module, or a folder, of its name, which has functions: see Functions. The module is
+imported only where the experiment runs. Its text is NAME.md.jinja: a macro for its help, title, claim and
+tolerance, and for each kind of finding and caption.
 """
 
 import importlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..core.finding import Finding
 from ..core.records import Experiment as Experiment
-from ..core.records import records_in
 
 if TYPE_CHECKING:  # for --help, the names are enough
     from ..core.check import Result
@@ -37,16 +35,36 @@ class Functions:
     skipped: Callable[["Robot"], Finding | None] = lambda robot: None  # why it does not apply to a robot
 
 
-EXPERIMENTS = records_in(Path(__file__).parent, "EXPERIMENT", Experiment)
+EXPERIMENTS = {  # in the order of `all` and of the report
+    "parameters": Experiment(serves_own=False, states_causes=True),
+    "published": Experiment(serves_own=False),
+    "kinematics": Experiment(module="states", asks_of_own=("com_positions", "jacobians")),
+    "mass": Experiment(module="states", asks_of_own=("mass_matrix",), overview="agreement"),
+    "gravity": Experiment(module="states", asks_of_own=("gravity", "bias")),
+    "acceleration": Experiment(module="states", overview="agreement"),
+    "engines": Experiment(serves_own=False, runs_file=True, asks_others=True, quick_speeds=0, first_screen=("answer",)),
+    "trajectory": Experiment(overview="scenes"),
+    "diagnosis": Experiment(needs_file=True, states_causes=True, compares=False),
+    "speed": Experiment(serves_own=False, timed=True, overview="times"),
+    "stability": Experiment(serves_own=False, runs_file=True, overview="limits",
+                            first_screen=("answer", "by_itself", "smaller", "remedies", "within")),
+    "derivatives": Experiment(serves_own=False, runs_file=True, timed=True, quick_speeds=8,
+                              first_screen=("answer", "standing")),
+    "reduction": Experiment(serves_own=False, runs_file=True, quick_speeds=8, first_screen=("answer", "needs")),
+}  # fmt: skip
 ALWAYS = "mujoco", "tmt"  # the engines that take part in each run
 TIMED = tuple(name for name, record in EXPERIMENTS.items() if record.timed)
 
 
 def module(name: str) -> ModuleType:
-    return importlib.import_module(f".{name}", __package__)
+    return importlib.import_module(f".{EXPERIMENTS.get(name, Experiment()).module or name}", __package__)
 
 
 def functions(name: str) -> Functions:
+    """Those of an experiment's module, or those that it makes for one of several experiments."""
+    if hasattr(module(name), "functions"):
+        made: Functions = module(name).functions(name)
+        return made
     names = [field.name for field in fields(Functions) if hasattr(module(name), field.name)]
     return Functions(**{function: getattr(module(name), function) for function in names})
 

@@ -26,10 +26,9 @@ from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
 from ..robots.states import Sample
-from . import Drawing, Experiment
+from . import Drawing
 from .setup import Setup
 
-EXPERIMENT = Experiment(order=80, needs_file=True, states_causes=True, compares=False)
 MOST_SAID = 3  # of causes that do the same
 POINTS = 61  # of a curve
 SECONDS_OF_CONDITIONS = 3.0

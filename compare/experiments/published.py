@@ -15,10 +15,8 @@ from ..core.finding import Finding
 from ..core.rows import Row, column
 from ..judge.scale import EPS, FACTOR, gravity_scale
 from ..robots import Printed, Robot
-from . import Experiment
 from .setup import Setup
 
-EXPERIMENT = Experiment(order=20, serves_own=False)
 SHOWN = ["item", "quantity", "component", "published", "exact", "tmt", "mujoco", "unit"]
 FUNCTIONS = {"Mbar": "mass_matrix", "qdd": "acceleration", "holding torque": "gravity_balance"}
 

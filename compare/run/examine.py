@@ -230,7 +230,7 @@ def section_with(name: str, result: Result, robot: Robot, is_alone: bool = False
 def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) -> None:
     """Add a failed check for each problem of a user's own equations that is not told, before the others."""
     others, result.checks = result.checks, []
-    asked = EXPERIMENTS.get(result.experiment, Experiment(0)).asks_of_own
+    asked = EXPERIMENTS.get(result.experiment, Experiment()).asks_of_own
     for number, problem in enumerate(problems):
         if number not in told and (asked is None or problem.quantity in asked):
             told.add(number)

@@ -44,7 +44,7 @@ from compare.run.reference import compared_with
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = [name for name, record in engines.RECORDS.items() if record.reads_file]
-RECORDS = {name: EngineRecord(order=1, label="Other", precision=name) for name in ("float64", "float32")}
+RECORDS = {name: EngineRecord("Other", precision=name) for name in ("float64", "float32")}
 TWO_LINKS = """<mujoco><worldbody><body><joint name="hip" axis="0 1 0" armature="0.01" damping="0.1"/>
 <inertial pos="0.1 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/><body pos="0 0 -1"><joint name="knee" axis="1 0 0"/>
 <inertial pos="0 0 -0.5" mass="1" diaginertia="0.1 0.1 0.01"/></body></body></worldbody></mujoco>"""
@@ -54,12 +54,10 @@ import dataclasses
 
 import tmt
 
-from . import EngineRecord
 from .outside.bodies import OF_JOINTS, links_of, numbers_of
 from .outside.model import ReadModel
 from .outside.order import Order
 
-ENGINE = EngineRecord(order=90, label="{label}", reads_file=True, precision="{precision}")
 METHODS = {{}}
 
 
@@ -113,17 +111,29 @@ if __name__ == "__main__":  # processes of engines begin with this file
 """
 
 
+def listed(root, line):
+    """Add a line after the list of engines of a copy."""
+    file = root / "compare/engines/__init__.py"
+    before, after = file.read_text().split("\nLABELS = ")
+    file.write_text(f"{before}\n{line}\nLABELS = {after}")
+
+
+def add_engine(root, name, text=AGAIN, **more):
+    about = RIGHT | more
+    (root / "compare/engines" / f"{name}.py").write_text(text.format(**about))
+    record = f"EngineRecord({about['label']!r}, reads_file=True, precision={about['precision']!r})"
+    listed(root, f"RECORDS[{name!r}] = {record}")
+
+
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     """The report of a copy of the package with these engines, and what it prints; its exit status is 1."""
     root = tmp_path_factory.mktemp("copy")
     for name in ("compare", "mjcf", "tmt"):
         shutil.copytree(ROOT / name, root / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in INSTALLED:  # what is installed here does not count
-        shutil.rmtree(root / "compare/engines" / name, ignore_errors=True)
-        (root / "compare/engines" / f"{name}.py").unlink(missing_ok=True)
-    for name, of in ENGINES.items():
-        (root / "compare/engines" / f"{name}.py").write_text(AGAIN.format(**(RIGHT | of)))
+    listed(root, "RECORDS = {name: record for name, record in RECORDS.items() if not record.reads_file}")
+    for name, of in ENGINES.items():  # what is installed here does not count
+        add_engine(root, name, **of)
     answers = root / "compare/engines/outside/answers.py"
     answers.write_text(answers.read_text().replace("LIMIT = 120.0", "LIMIT = 6.0"))
     (root / "robot.xml").write_text(TWO_LINKS)
@@ -233,7 +243,7 @@ def test_a_number_as_read_just_inside_and_just_outside(number):
 def test_a_process_that_ends_is_that_of_its_own_engine_alone_and_the_next_reads_again(report):
     root, ends = report[0].parent, "tmt.mass_matrix(*_) if at.u.any() else __import__('os')._exit(3)"
     mortal = AGAIN.replace("tmt.mass_matrix(self.tree, at.x)", ends.replace("*_", "self.tree, at.x"))
-    (root / "compare/engines/mortal.py").write_text(mortal.format(**RIGHT))
+    add_engine(root, "mortal", mortal)
     (root / "asked.py").write_text(ASKED)
     command, environment = [sys.executable, "asked.py"], os.environ | {"PYTHONPATH": str(root)}
     run = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True)

@@ -12,9 +12,10 @@ from models import random_tree
 import tmt
 from compare.core.check import Result
 from compare.engines.mujoco import parse
-from compare.experiments import acceleration, figures_sketch, gravity, kinematics, mass, module, published
+from compare.experiments import figures_sketch, functions, published, states
 from compare.experiments.parameters.numbers import check_forces
-from compare.experiments.quantities import QUANTITIES, check_wide
+from compare.experiments.quantities import QUANTITIES
+from compare.experiments.states import check_wide
 from compare.judge.entries import Entries
 from compare.judge.scale import EPS, FACTOR
 from compare.robots.arm import ARM, PRINTED
@@ -22,6 +23,8 @@ from compare.robots.states import Sample
 from compare.run.examine import Setup
 from tmt.exact.many import Pairs
 
+NAMES = "kinematics", "mass", "gravity", "acceleration"
+kinematics, mass, gravity, acceleration = map(functions, NAMES)
 OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of both engines that fail
     (kinematics, "com_positions", {}, {"x_b"}), (kinematics, "angular_velocities", {}, {"omega_b"}),
     (kinematics, "jacobians", {"place": 0}, {"T_b"}), (kinematics, "jacobians", {"place": 1}, {"B_b"}),
@@ -92,7 +95,7 @@ def test_a_joint_whose_accelerations_are_all_smaller_than_their_tolerance_is_not
         assert said == [(True, False)] * (not judged)
 
 
-@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda module: module.__name__.rpartition(".")[2])
+@pytest.mark.parametrize("experiment", EXPERIMENTS, ids=NAMES)
 def test_an_error_of_the_compiled_functions_alone_fails_their_own_check(mujoco, experiment, monkeypatch):
     assert failing(experiment, mujoco) == set()
     checks = {(quantity, name) for of, quantity, _, names in OF_MUJOCO if of is experiment
@@ -128,8 +131,8 @@ def test_a_mass_matrix_is_definite_by_more_than_rounding(least, passes):
     # in units of its diagonal: eigenvalues 1 - c and 1 + c of ((1, c), (c, 1)), whatever the units
     c, units = (1 - small) / (1 + small), np.sqrt([1e-9, 1.0])
     M = np.array([[1.0, c], [c, 1.0]]) * np.outer(units, units)
-    mass.check_definiteness(result, "TMT", np.array([np.eye(2), M]))  # the worst state decides
-    mass.check_definiteness(result, "of the other sign", np.array([-np.eye(2)]))
+    states.check_definiteness(result, "TMT", np.array([np.eye(2), M]))  # the worst state decides
+    states.check_definiteness(result, "of the other sign", np.array([-np.eye(2)]))
     assert list(verdicts(result).values()) == [passes, False]
 
 
@@ -149,7 +152,7 @@ def test_forces_that_the_equations_lack_are_zero_except_for_rounding_of_what_is_
 def test_a_mass_matrix_is_symmetric_within_the_scale_of_each_entry(share, passes):
     result, off = Result("mass"), share * 64 * EPS
     M = np.array([[[1.0, 1.0 + off * 2.0**10], [1.0, 1.0]]])
-    mass.check_symmetry(result, M, np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10)
+    states.check_symmetry(result, M, np.array([[[9e3, 1.0], [1.0, 9e3]]]) * 2.0**10)
     assert list(verdicts(result).values()) == [passes]
 
 
@@ -162,7 +165,7 @@ def test_the_headline_has_the_largest_share_and_what_is_no_number_first(rows, to
     result.rows = [
         SimpleNamespace(worst_difference=worst, difference_over_bar=share) for worst, share in rows
     ]
-    finding = mass.headline(result)
+    finding = states.headline(result)
     assert (finding and finding.values["row"]) is (None if top is None else result.rows[top])
 
 
@@ -273,7 +276,7 @@ def test_every_quantity_of_a_robot_of_any_joints_agrees_and_it_is_drawn(name):
 ])  # fmt: skip
 def test_units_are_those_of_the_joints_and_the_tolerance_of_springs_is_of_the_sums(name, unit, force):
     setup = setup_between(ROBOTS[name], states=5)
-    checks = mass.rows(setup).checks + gravity.rows(setup).checks
+    checks = states.rows("mass", setup).checks + states.rows("gravity", setup).checks
     units = {check.quantity: check.unit for check in checks}
     assert (units["Mbar"], units["holding torque"]) == (unit, force)
     held = [check for check in checks if check.quantity == "holding torque, springs too"]
@@ -287,7 +290,7 @@ def test_units_are_those_of_the_joints_and_the_tolerance_of_springs_is_of_the_su
 def test_an_error_of_a_number_fails_the_checks_that_depend_on_it(text, old, new, expected):
     assert text.count(old) == 1
     setup = setup_between(text, text.replace(old, new), states=10)
-    results = [module(name).rows(setup) for name in {name.split()[0] for name in expected}]
+    results = [functions(name).rows(setup) for name in {name.split()[0] for name in expected}]
     checks = [check for result in results for check in result.checks if check.failed]
     failed = [f"{check.experiment} {check.quantity}" for check in checks]
     assert all(any(name.startswith(named) for name in failed) for named in expected)

@@ -12,7 +12,7 @@ from compare.core.cause import Cause
 from compare.core.check import About, Result
 from compare.core.finding import Finding
 from compare.core.text import block
-from compare.experiments import module
+from compare.experiments import functions
 from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import conclusions
@@ -202,7 +202,7 @@ def timed(engine, method, seconds, error, **more):
 
 def marks(experiment, result, robot=ARM):
     """What is marked in the first panel of the picture of an experiment: (mark, colour, x) of every point."""
-    ((_, figure, _),) = (call() for call in module(experiment).overview({experiment: result}, robot))
+    ((_, figure, _),) = (call() for call in functions(experiment).overview({experiment: result}, robot))
     lines = [line for line in figure.axes[0].get_lines() if line.get_marker() not in (None, "None", "")]
     points = [(line, float(x)) for line in lines for x in line.get_xdata()]
     return {(line.get_marker(), to_hex(line.get_color()), x) for line, x in points}

@@ -8,13 +8,12 @@ from numpy import ndarray
 import tmt
 
 from ...robots.case import Case
-from .. import Course, Engine, EngineRecord, Method, Motion, OneByOne, Prepared
+from .. import Course, Engine, Method, Motion, OneByOne, Prepared
 from .equations import OwnEquations, passive
 from .functions import METHOD_NAMES, QUANTITIES, QUICK, OwnError, Problem
 
 __all__ = ["METHOD_NAMES", "QUANTITIES", "QUICK", "Own", "OwnDynamics", "OwnEquations", "OwnError", "Problem"]
 
-ENGINE = EngineRecord(order=50, label="yours", possessive="your", from_file=True)
 RK4_SCHEMES = ("rk4", "rk4_mean_speed")  # the second where a ball makes MuJoCo's RK4 another scheme
 
 

@@ -18,19 +18,11 @@ from ...engines.mujoco.names import INTEGRATORS
 from ...engines.mujoco.reading import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
-from .. import Drawing, Experiment
+from .. import Drawing
 from ..setup import Setup
 from . import standing, ways
 from .ways import CENTRED, ONE_SIDED, DerivativeRow, Subject, WayRow, number
 
-EXPERIMENT = Experiment(
-    order=105,
-    serves_own=False,
-    runs_file=True,
-    timed=True,
-    quick_speeds=8,
-    first_screen=("answer", "standing"),
-)
 MOST_SPEEDS = 40  # of a robot whose exact derivatives are traced in less than a minute
 FEW_SPEEDS = 8  # of a robot for which tmt's derivatives are compiled in a second
 EXACT = "tmt, exact"

@@ -19,15 +19,12 @@ from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.coordinates import Coordinates
 from ...robots.states import Sample
-from .. import Experiment
 from ..quantities import QUANTITIES
 from ..setup import Setup
 from .features import feature_of_speeds
 from .readings import compare_numbers
 from .tables import AnswerRow, EngineRow, EnginesResult, ReadRow, RunRow
 
-EXPERIMENT = Experiment(order=65, serves_own=False, runs_file=True, asks_others=True, quick_speeds=0,
-                        first_screen=("answer",))  # fmt: skip
 COMPARED = ("Mbar", "bias", "qdd")
 MOST_SHOWN = 12  # speeds of a robot whose state stands in the note of a check
 ITERATIONS = 2, 4, 100  # that are tried where a field differs

@@ -21,7 +21,6 @@ from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...robots.coordinates import Coordinates
 from ...robots.placement import places_of
-from .. import Experiment
 from ..setup import Setup
 from .causes import causes_of
 from .contacts import touches
@@ -39,7 +38,6 @@ from .numbers import (
     unit_of,
 )
 
-EXPERIMENT = Experiment(order=10, serves_own=False, states_causes=True)
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
 # numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)

@@ -30,16 +30,12 @@ from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ...stability.answer import joint_of
 from ...stability.push import Pushed
-from .. import Experiment
 from ..options import ReductionOptions
 from ..setup import Setup
 from .records import JointRow, ModelRow, UseRow
 from .scene import scene_of, scene_of_case
 from .search import TEXT, Locks, lockable, take_out, written
 
-EXPERIMENT = Experiment(
-    order=110, serves_own=False, runs_file=True, first_screen=("answer", "needs"), quick_speeds=8
-)
 ERROR = 1e-3  # rad or m, if none is asked for
 STATES = 5  # random ones, at which the locked models are compared
 ROUNDS = 6  # of timing

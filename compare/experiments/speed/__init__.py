@@ -11,13 +11,11 @@ from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
 from ...truth.reference import LOST, has_no_reference
-from .. import ALWAYS, Experiment
+from .. import ALWAYS
 from ..setup import Setup, different_first
 from . import conclusions, evaluations
 from .runs import FIRST_STEPS, RunRow, SceneRuns, SpeedResult, rows_of, scene_runs, take_times
 from .settings import followed, left_out, regular_of, scenes_of
-
-EXPERIMENT = Experiment(order=90, serves_own=False, timed=True, overview="times")
 
 
 def claim_values(robot: Robot) -> dict[str, str | float]:

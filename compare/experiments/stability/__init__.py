@@ -10,16 +10,12 @@ from ...judge.run import leaves_no_digits
 from ...robots import Robot
 from ...stability import push
 from ...stability.equilibrium import equilibrium
-from .. import Drawing, Experiment
+from .. import Drawing
 from ..setup import Setup
 from . import claims, departure, limits, of_file
 from .subjects import DAMPINGS, SCHEMES, coarsest_case, methods_of, subjects_of, unit_of_movements
 from .tables import LimitRow, StabilityResult
 
-EXPERIMENT = Experiment(
-    order=100, serves_own=False, runs_file=True, overview="limits",
-    first_screen=("answer", "by_itself", "smaller", "remedies", "within"),
-)  # fmt: skip
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to the coarsest step
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...engines import Engine, Method, one_of_each_scheme, same_scheme
+from ...engines import Engine, Method
 from ...robots import Robot
 from ...robots.case import Case
 from ...stability.equilibrium import equilibrium, posture_names
@@ -76,3 +76,16 @@ def fraction(duration: float, dt: float) -> str:
 def unit_of_movements(robot: Robot) -> str:
     """rad, m, or both."""
     return " or ".join(dict.fromkeys(robot.coordinates.units))
+
+
+def same_scheme(engines: Mapping[str, Engine], method: Method, engine: str) -> Method:
+    """The first method of an engine that is the same scheme as a given one."""
+    return next(m for m in engines[engine].methods.values() if m.scheme == method.scheme)
+
+
+def one_of_each_scheme(engine: Engine) -> tuple[Method, ...]:
+    """Of methods of one engine that are the same scheme the first."""
+    first: dict[str, Method] = {}
+    for method in engine.methods.values():
+        first.setdefault(method.scheme, method)
+    return tuple(first.values())

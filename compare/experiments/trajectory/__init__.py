@@ -13,12 +13,10 @@ from ...judge.run import LEFT, MOVES, deviation, leaves_no_digits, movement_unit
 from ...robots import Robot
 from ...robots.case import Case
 from ...truth.reference import RECORDS, Reference, reference
-from .. import Experiment
 from ..setup import Setup, different_first
 from .pairs import SCHEMES_OF_RK4, TrajectoryResult, recorded
 from .runs import compare_case
 
-EXPERIMENT = Experiment(order=70, overview="scenes")
 SECONDS_OF_OWN = {"full": 20.0, "quick": 4.0, "small": 2.0}  # of all runs of a user's own equations, about
 OVERHEAD_OF_OWN = 1e-4  # s of an evaluation in a run, about, beyond the equations themselves
 STAGES_OF_RK4 = 4  # evaluations in a step of RK4

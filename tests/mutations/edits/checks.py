@@ -5,7 +5,7 @@ CHECKS = (
     ("parameters", "compare_number", "quantity"), ("parameters", "check_forces", 'f"no forces of {_1}"'),
     ("published", "check_answer", "printed_digits"), ("published", "check_answer", "from_exact"),
     ("published", "check_answer", "every_digit"), ("published", "check_answer", "size"),
-    ("mass", "check_symmetry", "what"), ("mass", "check_definiteness", "what"),
+    ("states", "check_symmetry", "what"), ("states", "check_definiteness", "what"),
     ("conclusions", "check_same_schemes", "quantity"), ("conclusions", "check_stopped", "quantity"),
     ("conclusions", "check_smallest_errors", "quantity"),
     ("trajectory", "check_time_judged", '"time judged"'), ("trajectory", "check_divergence", "what"),
@@ -18,10 +18,10 @@ CHECKS = (
 )  # fmt: skip
 # module, function, the two that are compared, as written in the call of `agree`
 AGREEMENTS = (
-    ("gravity", "rows", '"holding torque, springs too"'), ("gravity", "rows", '"yours: gravity - bias at rest"'),
-    ("acceleration", "rows", 'f"tau from MuJoCo\'s qdd by {_1}"'),
-    ("acceleration", "rows", 'f"tau from {_1} qdd by mj_inverse"'),
-    ("acceleration", "rows", 'f"dE/dt - {work} at {_1} qdd"'),
+    ("states", "check_gravity", '"holding torque, springs too"'), ("states", "check_gravity", '"yours: gravity - bias at rest"'),
+    ("states", "check_acceleration", 'f"tau from MuJoCo\'s qdd by {_1}"'),
+    ("states", "check_acceleration", 'f"tau from {_1} qdd by mj_inverse"'),
+    ("states", "check_acceleration", 'f"dE/dt - {work} at {_1} qdd"'),
 )  # fmt: skip
 EDITS = (
     *(
@@ -35,7 +35,7 @@ EDITS = (
         for module, where, quantity in AGREEMENTS
     ),
     *(
-        ("quantities", "Comparison.compare", "self.agree(_1, _2, values, mujoco_values, *_3)",
+        ("states", "Comparison.compare", "self.agree(_1, _2, values, mujoco_values, *_3)",
          f"self.agree(_1, _2, values, values if name == {quantity!r} else mujoco_values, *_3)",
          f"{quantity} is compared with itself")
         for quantity in ("x_b", "omega_b", "T_b", "B_b", "v_conv", "w_conv", "Mbar", "holding torque", "bias", "qdd", "energy")

@@ -26,7 +26,7 @@ EDITS = (
     ("run", "widths", "largest >= STILL * of_unit", "True", "a joint that hardly moves ends the time that is judged"),
     ("trajectory.runs", "check_time_judged", "until < least", "False", "a run that is hardly judged agrees"),
     ("trajectory.pairs", "Pair.judged", "_1.all(axis=1)", "_1.any(axis=1)", "one narrow band is enough"),
-    ("quantities", "check_wide", "least >= largest", "least < 0.0", "tolerances may exceed all values"),
+    ("states", "check_wide", "least >= largest", "least < 0.0", "tolerances may exceed all values"),
     ("run", "LEFT", "0.1", "0.13", "an arm has left when it is 0.13 rad away"),
     ("run", "departure", "t[away][0]", "t[away][-1]", "the last time away is that of leaving"),
     ("run", "exchanged", "2.0 * gravity_scale(_1, _2)", "6.0 * gravity_scale(_1, _2)", "the bound of the energy x 3"),

@@ -74,7 +74,7 @@ EDITS = (
     ("parameters.numbers", "Compared.is_opposite", "self.quantity == 'axis' and _1", "False",
      "an opposite axis is not an option"),
     ("parameters.numbers", "check_forces", "FACTOR * EPS * float(largest)", "1.0", "forces of fluid are rounding"),
-    ("quantities", "check_wide", "least >= largest", "least >= 1e9 * largest", "accelerations that rounding hides are judged"),
-    ("acceleration", "energy_rate", "_1 + method.spring_energy(*_2)", "_1", "springs store nothing"),
-    ("quantities", "headline", "max(*_1)", "min(*_1)", "the headline has the best"),
+    ("states", "check_wide", "least >= largest", "least >= 1e9 * largest", "accelerations that rounding hides are judged"),
+    ("states", "energy_rate", "_1 + method.spring_energy(*_2)", "_1", "springs store nothing"),
+    ("states", "headline", "max(*_1)", "min(*_1)", "the headline has the best"),
 )  # fmt: skip

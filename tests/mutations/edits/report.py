@@ -65,7 +65,7 @@ EDITS = (
     ("report.document", "Document.page", "standing(section)[0] is False", "not standing(section)[0]", "what is open fails"),
     ("verdict", "standing", "any(failing)", "False", "the line of an experiment whose checks fail is good"),
     ("report.document", "Document.pictures", "any(other in wrong for _1 in _2)", "False", "no failing picture is marked"),
-    ("quantities", "headline", "max(known, *_1)", "min(known, *_1)", "its line has the best difference"),
+    ("states", "headline", "max(known, *_1)", "min(known, *_1)", "its line has the best difference"),
     ("published", "PrintedRow.is_met", "max(_1, _2)", "min(_1, _2)", "a number that one engine meets is met by both"),
     ("core.check", "largest_known", "max(*_1)", "min(*_1)", "the picture has the least distance"),
     ("stability.limits", "summary", "max(_1, *_2)", "min(_1, *_2)", "the nearest limit is told as the farthest"),
