@@ -67,7 +67,8 @@ def carry_out(experiment: str, options: Options, command: str) -> int:
     lines = first_screen(report, mended, is_alone)
     terminal.say()
     terminal.say_lines(lines, "bold green" if report.passed else "bold red")
-    for line in compared.reference.notes(is_alone and EXPERIMENTS[experiment].runs_file):
+    reference, runs_file = compared.reference, is_alone and EXPERIMENTS[experiment].runs_file
+    for line in (*reference.to_know, *([reference.loop] if reference.loop and not runs_file else [])):
         terminal.say(line)
     program = "reproduce.py" if (out / "reproduce.py").exists() else ""
     terminal.say(block("run", "report", path=page, seconds=seconds, program=program))

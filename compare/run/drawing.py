@@ -23,14 +23,11 @@ def draw(
     others: the results for the picture of the first screen, see `results_needed`.
     few: this picture alone; the first figure of an experiment that has none.
     """
-    most = None
-    if few:
-        most = 0 if picture_of(experiment) else 1
-    of_experiment = functions(experiment)
+    of_experiment, most = functions(experiment), 0 if picture_of(experiment) else 1
     overview = of_experiment.overview({**others, experiment: result}, robot) if others else ()
     drawn: list[Figure] = []
     with quiet(robot):
-        for call in chain(islice(of_experiment.figures(result, robot), most), overview):
+        for call in chain(islice(of_experiment.figures(result, robot), most if few else None), overview):
             file, figure, caption = call()
             while file.casefold() in {other.file.casefold() for other in drawn}:
                 file += "_"  # names that differ in signs alone may give one file

@@ -41,21 +41,15 @@ class Examined(NamedTuple):
 
 
 def setup_of(compared: Compared, options: Options, **more: Any) -> Setup:
-    """What the experiments need. more: further fields of Setup."""
-    make, chosen = Setup.quick if options.quick else Setup, options.get("engines")
-    others = not_chosen(chosen) if chosen else set()
-    of_run = engines(compared.mujoco, compared.reference.own)
-    of_run = {name: engine for name, engine in of_run.items() if name not in others}
-    return make(compared.robot, of_run, reading=compared.reading, options=options, **more)
-
-
-def not_chosen(chosen: str) -> set[str]:
-    """The engines that read files and are not chosen, by names. Refused: a name is none of these."""
-    known, names = [name for name, record in RECORDS.items() if record.reads_file], chosen.split(",")
+    """What the experiments need. more: further fields of Setup. Refused: --engines has a name that is none."""
+    make, of_run = Setup.quick if options.quick else Setup, engines(compared.mujoco, compared.reference.own)
+    known, chosen = [name for name, record in RECORDS.items() if record.reads_file], options.get("engines")
+    names = chosen.split(",") if chosen else known
     for name in names:
         if name not in (*ALWAYS, *known):
             raise Refused(block("run", "no_engine", name=name, known=known))
-    return {*known} - {*names}
+    of_run = {name: engine for name, engine in of_run.items() if name in names or name not in known}
+    return make(compared.robot, of_run, reading=compared.reading, options=options, **more)
 
 
 @dataclass
@@ -104,7 +98,7 @@ class Run:
                 self.clock.ends(name)
             else:
                 self.examine(name)
-        self.causes, self.mended = causes(self.setup, self.sections)
+        self.causes, self.mended = self.attempt("causes", causes, self.setup, self.sections) or ([], 0)
         self.say_outcomes()
         self.finish_drawings()
         sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
@@ -125,10 +119,16 @@ class Run:
 
     def attempt(self, name: str, act: Callable[..., Value], *arguments: Any) -> Value | None:
         """act(*arguments); if it raises, None, and the experiment has crashed."""
-        value, crash = attempt(name, self.setup, act, *arguments)
-        if crash:
-            self.crashed.setdefault(name, crash)
-        return value
+        try:
+            with quiet(self.setup.robot):
+                return act(*arguments)
+        except WorkerEnded:
+            raise
+        except Exception as error:
+            if name not in self.crashed:
+                self.crashed[name] = Result(name, shown=[])
+                add_crash(self.crashed[name], ENDS, error)
+            return None
 
     def needless(self, name: str) -> str:
         """Why an experiment is left out of a run of several; "" if it is not."""
@@ -188,13 +188,12 @@ class Run:
         return section or Section(name, name, "", "", self.crashed[name])
 
     def draw(self, section: Section) -> None:
-        if section.name in self.crashed:
-            return
-        few = self.setup.is_quick and not self.setup.alone and not any(failures([section]))
-        others = results_needed(section.name, self.order, self.sections)
-        with self.clock.of(END):
+        if section.name not in self.crashed:
+            few = self.setup.is_quick and not self.setup.alone and not any(failures([section]))
+            others = results_needed(section.name, self.order, self.sections)
             arguments = section.name, section.result, self.setup.robot, self.folder / "figures", others, few
-            self.drawings.append((section, self.workers.submit(draw, *arguments)))
+            with self.clock.of(END):
+                self.drawings.append((section, self.workers.submit(draw, *arguments)))
 
     def finish_drawings(self) -> None:
         for section in self.sections:
@@ -255,16 +254,13 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
         return [], 0
     numbers = list[Cause]()
     if not setup.robot.own:
-        of_numbers = next((section.result for section in sections if section.name == "parameters"), None)
-        of_numbers = of_numbers or attempt("parameters", setup, functions("parameters").rows, setup)[0]
-        numbers = of_numbers.causes if of_numbers else []
+        known = [section.result for section in sections if section.name == "parameters"]
+        numbers = (known or [functions("parameters").rows(setup)])[0].causes
     others = [cause for cause in numbers if cause.quantity not in IN_EQUATIONS]
     in_equations = sum(cause.owners for cause in numbers if cause not in others)
     if setup.robot.is_stated and numbers and in_equations < 2:
         return numbers, 0
-    found, _ = attempt("diagnosis", setup, module("diagnosis").diagnosed, setup)
-    if found is None:
-        return numbers, 0
+    found = module("diagnosis").diagnosed(setup)
     is_explained = bool(found.why.diagnosis.causes)
     if setup.robot.is_stated and numbers:
         is_one = is_explained and found.why.diagnosis.causes[0].rank < 3
@@ -272,21 +268,6 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
     places = [cause.place for cause in numbers]
     searched = [cause for cause in found.said if cause.place not in places]
     return searched + numbers, found.states * is_explained
-
-
-def attempt(
-    name: str, setup: Setup, act: Callable[..., Value], *arguments: Any
-) -> tuple[Value | None, Result | None]:
-    """act(*arguments), and None; if it raises, None and a Result with one failed check."""
-    try:
-        with quiet(setup.robot):
-            return act(*arguments), None
-    except WorkerEnded:
-        raise
-    except Exception as error:
-        result = Result(name, shown=[])
-        add_crash(result, ENDS, error)
-        return None, result
 
 
 def add_crash(result: Result, quantity: str, error: Exception) -> None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.finding import Finding
 from ..core.text import block, say
 from ..core.words import in_one_line
 from ..engines import Engine
@@ -38,14 +39,13 @@ class JointsDiffer(ModelError):
 class Reference(NamedTuple):
     kind: str  # of REFERENCES, "solution" or "own"
     file: str  # as it is given, in one line
-    remarks: tuple[str, ...] = ()  # what is fixed, changed or switched off, a line each
-    warnings: tuple[str, ...] = ()  # of MuJoCo's compiler, one line each
+    remarks: tuple[str, ...] = ()  # what is fixed, changed or switched off, of MuJoCo's compiler: a line each
+    to_know: tuple[str, ...] = ()  # of these for the first screen: what is fixed, or cannot be read
+    loop: str = ""  # of the first screen of a comparison: constraints that close it
     source: str = ""  # the solution, or the place of own equations, as given, in one line
     own: Own | None = None  # the engine of these equations
     renamed: tuple[str, ...] = ()  # "wrist as hand": joints matched under other names
     otherwise: tuple[str, ...] = ()  # modelled in another way, with the same motion, a line each
-    to_know: tuple[str, ...] = ()  # of the first screen: what is fixed, or cannot be read
-    loop: str = ""  # of the first screen of a comparison: constraints that close it
 
     @property
     def name(self) -> str:
@@ -59,22 +59,13 @@ class Reference(NamedTuple):
         file, other = names if names[0] != names[1] else paths
         return block("run", "subject", kind=self.kind, file=file, other=other)
 
-    def notes(self, runs_file: bool) -> tuple[str, ...]:
-        """What a user must know beside the answer. runs_file: it is about the file as it is."""
-        return self.to_know if runs_file or not self.loop else (*self.to_know, self.loop)
-
-    @property
-    def matched(self) -> str:
-        return f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
-
     @property
     def lines(self) -> tuple[str, ...]:
-        """The first lines of the output and of the report."""
+        """The first lines of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
+        matched = f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
         first = f"reference: {self.kind}; {self.file} compared with {other}"
-        lines = first, self.matched, *self.otherwise, *self.remarks
-        warned = (f"MuJoCo warns: {line}" for line in self.warnings)
-        return tuple(in_one_line(line) for line in (*lines, *warned) if line)
+        return tuple(in_one_line(line) for line in (first, matched, *self.otherwise, *self.remarks) if line)
 
 
 class Compared(NamedTuple):
@@ -102,31 +93,35 @@ def compared_with(
     if asked and is_solution(asked):
         return with_solution(source, shown, asked, solution or asked)
     reading = read(source)
-    robot, mujoco = robot_of(reading, shown), engine(reading)
+    robot, mujoco, found = robot_of(reading, shown), engine(reading), remarks(reading, has_scenes=True)
+    loop = closed_loop(reading, Path(shown).name)
+    reference = reference_of("model", source, shown, found)._replace(loop=say(loop) if loop else "")
     if asked in (None, "model"):
-        return Compared(reference_of("model", reading, shown), robot, mujoco, reading)
-    reference = reference_of("own", reading, shown)
-    own = own_engine(asked, robot, mujoco, joints, reference.loop)
+        return Compared(reference, robot, mujoco, reading)
+    try:
+        own = own_engine(asked, robot, mujoco, joints)
+    except OwnError as error:
+        raise OwnError(f"{error}. {reference.loop}" if loop else str(error)) from None
     robot = replace(robot, own=tuple(own.equations.functions))
-    reference = reference._replace(source=in_one_line(asked), own=own)
-    return Compared(reference, robot, mujoco, reading)
+    return Compared(reference._replace(kind="own", source=in_one_line(asked), own=own), robot, mujoco, reading)
 
 
-def reference_of(kind: str, reading: Reading, shown: str) -> Reference:
-    """The reference of a file as compiled, with what is fixed, changed or switched off in it."""
-    found, loop = remarks(reading, has_scenes=True), closed_loop(reading, Path(shown).name)
+def reference_of(kind: str, source: Source, shown: str, found: Sequence[Finding]) -> Reference:
+    """The reference of a file, with what is found of it: fixed, changed or switched off."""
+    lines = *map(say, found), *(f"MuJoCo warns: {line}" for line in source.warnings)
     to_know = tuple(say(finding) for finding in found if finding.kind in ("fixed_base", "missing"))
-    reference = Reference(kind, shown, tuple(map(say, found)), reading.warnings, to_know=to_know)
-    return reference._replace(loop=say(loop) if loop else "")
+    return Reference(kind, shown, lines, to_know)
 
 
 def with_solution(source: Source, shown: str, asked: str, solution: str) -> Compared:
     """A file and that of another robot with the same joints, placed as in the file; solution: its path."""
     reading, other, name = read(source), Source(Path(solution)), in_one_line(asked)
     stated = read(other)
-    reference = reference_of(SOLUTION, reading, shown)
+    reference = reference_of(SOLUTION, source, shown, remarks(reading, has_scenes=True))
     names, renamed = joints_matched(stated, reading, shown, name)
-    if bodies_on(stated, names) != bodies_on(reading, reading.tree.joint_names):
+    tree = reading.tree
+    on_joints = Counter(names[joint] for joint in stated.tree.body_joint)  # bodies with mass
+    if on_joints != Counter(tree.joint_names[joint] for joint in tree.body_joint):
         source, other = source.joined(), other.joined()
         reading, stated = read(source), read(other)
     placement = placed(replace(stated.tree, joint_names=names), reading.tree)
@@ -140,9 +135,9 @@ def with_solution(source: Source, shown: str, asked: str, solution: str) -> Comp
 
 def with_arm(source: Source, path: str | None, shown: str) -> Compared:
     """A file (None: the arm's) and the arm's numbers, placed as in the file, whose welded bodies are one."""
+    reference = reference_of("arm", source, shown, of_source(source) if path else [])
     if path is None:
-        return Compared(Reference("arm", shown, (), source.warnings), ARM, parse(source, ARM.tree), None)
-    said = tuple(map(say, of_source(source)))
+        return Compared(reference, ARM, parse(source, ARM.tree), None)
     source, robot, names = source.joined(), replace(ARM, mjcf=Path(path)), Matched(ARM.joints, ())
     reading = read(source)
     if not has_hinges(source, ARM.joints):
@@ -154,8 +149,8 @@ def with_arm(source: Source, path: str | None, shown: str) -> Compared:
         printed = tuple(item._replace(to_every_digit=(), sizes=()) for item in robot.printed)
         robot = replace(robot, tree=placement.tree, landmarks=None, printed=printed)
     otherwise = tuple(map(say, placement.remarks() + of_welded(source)))
-    of_arm = Reference("arm", shown, said, source.warnings, renamed=names.renamed, otherwise=otherwise)
-    return Compared(of_arm, robot, parse(source, robot.tree), None)
+    reference = reference._replace(renamed=names.renamed, otherwise=otherwise)
+    return Compared(reference, robot, parse(source, robot.tree), None)
 
 
 def is_solution(reference: str) -> bool:
@@ -170,12 +165,7 @@ def joints_matched(stated: Robot | Reading, reading: Reading, shown: str, whose:
         raise JointsDiffer(shown, whose, str(error)) from None
 
 
-def bodies_on(reading: Reading, names: Sequence[str]) -> Counter[str]:
-    """How many bodies with mass are on each joint, by names of the joints in the order of its Tree."""
-    return Counter(names[joint] for joint in reading.tree.body_joint)
-
-
-def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None, loop: str = "") -> Own:
+def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None) -> Own:
     """The engine of the equations that FILE.py:OBJECT or MODULE:OBJECT names, called once; or OwnError."""
     source, coordinates, rng = own_object(reference), robot.coordinates, np.random.default_rng(SEED)
     q = np.concatenate([robot.posture()[None], coordinates.random(rng, 2, robot.ranges)])
@@ -187,5 +177,5 @@ def own_engine(reference: str, robot: Robot, mujoco: Engine, joints: str | None,
     except JointsError as error:
         raise OwnError(f"--joints: {error}") from None
     except OwnError as error:
-        raise OwnError(f"{reference.rstrip(':')}: {error}{f'. {loop}' if loop else ''}") from None
+        raise OwnError(f"{reference.rstrip(':')}: {error}") from None
     return Own(equations, (method.scheme for method in mujoco.methods.values()))
