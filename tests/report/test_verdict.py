@@ -171,7 +171,7 @@ AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2",
 
 
 @pytest.mark.parametrize("name, rows, numbers, named", [
-    ("parameters", [SAME, OFF], "1 2", "all as stated"), ("published", [replace(PRINTED, mujoco=0.8)], "0 1", ""),
+    ("parameters", [SAME, OFF], "1 2", "none is different"), ("published", [replace(PRINTED, mujoco=0.8)], "0 1", ""),
     ("gravity", [AGREED, replace(AGREED, quantity="other", worst_difference=1.0, difference_over_bar=0.05)], "2e-16 10", "Mbar"),
     ("trajectory", [SimpleNamespace(scene="a", difference_over_band=share) for share in (0.04, 12.0)], "1 12", ""),
     ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, cast
+from typing import cast
 
 import numpy as np
 
@@ -17,8 +17,7 @@ from ..setup import Setup
 FEW, MANY = 1000, 100_000  # states of one call
 MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
 FIRST_CALLS, MOST_CALLS, TIMED = 4, 100_000, 1e-3  # repetitions in a timed call of about so many s
-FORWARD = "forward_dynamics"
-ONE_BY_ONE, SIDE_BY_SIDE = "compiled", "compiled, side by side"
+FORWARD, ONE_BY_ONE, SIDE_BY_SIDE = "forward_dynamics", "compiled", "compiled, side by side"
 
 
 @dataclass
@@ -33,11 +32,7 @@ class EvaluationRow(Row):
     operations_per_ns: float | None = None
 
 
-class Loop(NamedTuple):
-    """A way to evaluate: its row, and run(count), which repeats it."""
-
-    row: EvaluationRow
-    run: Callable[[int], object]
+Loop = tuple[EvaluationRow, Callable[[int], object]]  # a way to evaluate: its row, and run(count), which repeats it
 
 
 def loops(setup: Setup) -> list[Loop]:
@@ -49,24 +44,19 @@ def loops(setup: Setup) -> list[Loop]:
     many = setup.of(MANY if coordinates.nv <= MOST_OF_MANY else 10 * FEW, FEW, FEW)
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
-    compiled = Evaluator(tree, "acceleration")
-    operations = compiled.operations
-    ready = at_many_states(compiled, operations, *(values[:FEW] for values in states))
     dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
     of_mujoco = calls.loops(dynamics, *(values[0] for values in states)).items()
-    ready += [Loop(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
-    for loop in ready:
-        loop.run(1)  # its code is compiled, or loaded, on the first call
-    return ready + (at_many_states(compiled, operations, *states) if many > FEW else [])
-
-
-def at_many_states(compiled: Evaluator, operations: int, *states: np.ndarray) -> list[Loop]:
-    """The ways of tmt over many states, q (N, nq), qd and tau (N, nv)."""
-    out, ways = np.empty((len(states[0]), compiled.size)), []
-    for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
-        row = EvaluationRow(FORWARD, name, len(out), operations=operations)
-        ways.append(Loop(row, partial(repeat, partial(compiled.fill, in_lanes, out, *states))))
-    return ways
+    ready: list[Loop] = [(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
+    compiled = Evaluator(tree, "acceleration")
+    for count in dict.fromkeys((FEW, many)):
+        out, some = np.empty((count, compiled.size)), [values[:count] for values in states]
+        for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
+            row = EvaluationRow(FORWARD, name, count, operations=compiled.operations)
+            ready.append((row, partial(repeat, partial(compiled.fill, in_lanes, out, *some))))
+    for row, run in ready:
+        if row.states <= FEW:  # its code is compiled, or loaded, on the first call
+            run(1)
+    return ready
 
 
 def repeat(call: Callable[[], object], count: int) -> None:
@@ -76,11 +66,11 @@ def repeat(call: Callable[[], object], count: int) -> None:
 
 def costs(ready: Sequence[Loop], rounds: int) -> list[EvaluationRow]:
     """The rows of ways that are timed, the slowest first."""
-    some: list[Callable[[], object]] = [partial(loop.run, FIRST_CALLS) for loop in ready]
+    some: list[Callable[[], object]] = [partial(run, FIRST_CALLS) for _, run in ready]
     each = [min(seconds) / FIRST_CALLS for seconds in timing.in_turns(some, rounds)]
     counts = [min(max(1, int(TIMED / seconds)), MOST_CALLS) for seconds in each]
-    calls: list[Callable[[], object]] = [partial(loop.run, count) for loop, count in zip(ready, counts)]
+    calls: list[Callable[[], object]] = [partial(run, count) for (_, run), count in zip(ready, counts)]
     for (row, _), count, seconds in zip(ready, counts, timing.in_turns(calls, rounds)):
         row.ns_per_state = 1e9 * min(seconds) / (count * row.states)
         row.operations_per_ns = row.operations and row.operations / row.ns_per_state
-    return sorted((loop.row for loop in ready), key=lambda row: -(row.ns_per_state or 0.0))
+    return sorted((row for row, _ in ready), key=lambda row: -(row.ns_per_state or 0.0))

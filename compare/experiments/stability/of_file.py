@@ -123,9 +123,7 @@ def check(result: StabilityResult, row: StepLimitRow, quantity: str) -> None:
 
 
 def headline(result: StabilityResult) -> Finding | None:
-    """Whether the step in use is stable, at the worst of the postures."""
+    """Whether the step in use is stable, at the posture that the answer and its table are of."""
     rows: Sequence[StepLimitRow] = result.tables["step_limits"]
-    own = [row for row in rows if row.integrator == row.file_integrator]
-    known = [row for row in own if row.stable_at_file_dt is not None]
-    worst = min(known, key=lambda row: (row.stable_at_file_dt is True, row.longest_s), default=None)
-    return None if worst is None else result.finding("headline", OF, row=worst)
+    row = next((row for row in rows if row.integrator == row.file_integrator), None)
+    return None if row is None or row.stable_at_file_dt is None else result.finding("headline", OF, row=row)

@@ -231,7 +231,7 @@ def test_compilation_is_the_sum_of_the_methods_of_an_engine():
 def test_operations_per_nanosecond_are_those_of_a_state_over_its_time(monkeypatch):
     row = evaluations.EvaluationRow(evaluations.FORWARD, evaluations.ONE_BY_ONE, 10_000, operations=133)
     monkeypatch.setattr(evaluations.timing, "in_turns", lambda calls, rounds: [[2e-3, 1e-3]])
-    (found,) = evaluations.costs([evaluations.Loop(row, lambda count: None)], 2)
+    (found,) = evaluations.costs([(row, lambda count: None)], 2)
     assert found.ns_per_state == pytest.approx(25.0)  # four calls of 10,000 states in a millisecond
     assert found.operations_per_ns == pytest.approx(133 / 25.0)
 

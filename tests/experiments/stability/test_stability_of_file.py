@@ -140,13 +140,14 @@ def test_a_check_of_each_posture(result, up_to, fails, stable, passes):
     assert (check.passed if check.judged else None) is passes
 
 
-def test_other_postures_are_told_and_the_worst_is_the_headline(result):
+def test_other_postures_are_told_and_the_headline_is_of_the_posture_of_the_table(result):
     rows = [row(), row(0.001, 0.00106, False, posture="crouch"), row(0.2, None, posture="sit")]
     of_file.tell(result, "others", rows=rows[1:], unstable=rows[1:2])
     (text,) = said(result, "others")
     assert "sit over 200 ms" in text and "not stable: crouch (1 ms)" in text
     result.tables["step_limits"] = rows
-    assert of_file.headline(result).values["row"].posture == "crouch"
+    first = of_file.headline(result)
+    assert first.values["row"] is rows[0] and f'from "{rows[0].posture}"' in say(first)
     result.tables["step_limits"] = [replace(rows[0], stable_at_file_dt=None)]
     assert of_file.headline(result) is None
 
