@@ -91,6 +91,13 @@ def test_one_slip_is_one_cause_beneath_the_first_experiment_that_differs(folder,
     assert len(alone) > 1 and [line.strip() for line in lines if line.startswith("     or ")] == [f"or {x}" for x in alone[1:]]
 
 
+def test_torques_that_act_with_gears_are_one_cause_in_words(folder):
+    geared = "lambda q, v, tau: acceleration(q, v, [25.0, 2.0] * tau)"
+    (folder / "gears.py").write_text(f"from mine import *\n\ngears = changed(acceleration={geared})\n")
+    (cause,) = examined(folder, "gears.py:gears", ["acceleration", "diagnosis"]).causes
+    assert "tau of hip: your acceleration takes 25 times it" in cause.text and "tau of knee: your acceleration takes 2 " in cause.text
+
+
 def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
     names = [*STATIC, "trajectory", "diagnosis"]
     asked = [name for name in names if not skipped(name, examined(folder, "mine.py:alone", []).robot)]

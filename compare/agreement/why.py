@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy import ndarray
@@ -209,14 +209,14 @@ def of_inputs(names: tuple[str, ...], factors: ndarray, left_over: LeftOver, rat
     """Torques that act with other factors or elsewhere, and what else acts; left_over: with these factors."""
     off = np.argwhere(np.abs(factors - np.eye(len(names))) > CONSTANT).tolist()
     wrong = [(names[j], names[i] if i != j else "", float(factors[i, j])) for i, j in off]
-    about: dict[str, Any] = {"rank": 2, "kind": "input", "unit": "times"}
-    causes = tuple(
-        Cause(place=f"tau of {name}{f' at {at}' * bool(at)}", stated=float(not at), explains=x, **about)
-        for name, at, x in wrong
-    )
-    text = f"{say(Finding('agreement', 'inputs', {'factors': wrong}))} {left_over.sentence()}".rstrip()
-    found = of_force(text, causes + left_over.causes, ratio)
-    return found._replace(is_found=left_over.ratio <= 1.0 or bool(left_over.causes))
+    text = f"{say(Finding('agreement', 'inputs', {'factors': wrong}))} {left_over.sentence()}".strip()
+    places = [f"tau of {name}{f' at {at}' * bool(at)}" for name, at, _ in wrong]
+    stated, explains = (", ".join(map("{:.7g}".format, x)) for x in zip(*((float(not at), x) for _, at, x in wrong)))
+    cause = Cause(
+        rank=2, kind="input", place=" and ".join(places), stated=stated, explains=explains, unit="times",
+        text=text.removesuffix("."),
+    )  # fmt: skip
+    return Why(text, left_over.ratio <= 1.0 or bool(left_over.causes), Diagnosis(False), (cause,), text, ratio)
 
 
 def of_needed_forces(given: Given, left_over: LeftOver) -> Why:

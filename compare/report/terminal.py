@@ -16,6 +16,7 @@ from ..core.words import in_one_line
 from ..process import interrupt
 from ..process.streams import Stream
 
+WIDEST = 100  # columns of a line on a terminal, which may be wider
 LONG = 5.0  # s, after which it is said for how long something has been going on
 EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
@@ -32,7 +33,7 @@ class Terminal:
 
     def say(self, text: str = "", style: str = "") -> None:
         """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped."""
-        text, columns = in_one_line(text), self.out.columns()
+        text, columns = in_one_line(text), min(self.out.columns() or 0, WIDEST)
         if columns and len(text) > columns:
             indent = " " * (len(text) - len(text.lstrip()))
             narrow = indent + re.sub(" {2,}", "  ", text.strip())
