@@ -76,11 +76,7 @@ def test_inputs_of_a_roll_are_those_of_a_program_in_plain_steps():
         path.append(data.qpos.copy())
     rolled = stepper.roll(start, 20, inputs)
     assert np.array_equal(rolled.q[0], path)
-
-    def act(step, d):
-        d.ctrl[:] = inputs[step]
-
-    assert np.array_equal([d.qpos.copy() for d in stepper.watch(start, 20, act)], path)
+    assert np.array_equal([d.qpos.copy() for d in stepper.watch(start, 20, inputs)], path)
 
 
 def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():

@@ -1,5 +1,6 @@
-"""Changes of a compiled model: each takes a model and gives a changed copy, or None if nothing would change."""
+"""What changes a model: functions that give a changed copy of one, or None if nothing would change; inertias of a spec."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -88,6 +89,21 @@ def with_noslip(model: mujoco.MjModel, count: int) -> mujoco.MjModel:
 def with_impratio(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
     """With a factor times the ratio of frictional to normal impedance of contacts."""
     return changed(model, impratio=factor * model.opt.impratio)
+
+
+def state_as_compiled(spec: mujoco.MjSpec, model: mujoco.MjModel, numbers: Sequence[int]) -> None:
+    """State the inertias of all bodies, whose numbers in the model are given, as they were compiled."""
+    for body, number in zip(spec.bodies[1:], numbers[1:]):
+        state_inertial(body, model.body_mass[number], model.body_ipos[number])
+        body.iquat, body.inertia = model.body_iquat[number], model.body_inertia[number]
+        body.fullinertia = np.full(6, np.nan)
+    spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
+    spec.compiler.settotalmass = -1.0
+
+
+def state_inertial(body: mujoco.MjsBody, mass: float, com: np.ndarray) -> None:
+    body.mass, body.ipos, body.explicitinertial = mass, com, True
+    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT
 
 
 class Program(NamedTuple):

@@ -1,21 +1,14 @@
-"""Motions of a file that smaller models of it repeat: how far those are from them, and what they use."""
+"""Motions of a model that another one repeats: how far it is from them, and what they use."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
-import tmt
-
 from .names import control_of, element_name, number_of_actuators, output_of
 from .stepper import Stepper, distance
-
-if TYPE_CHECKING:
-    from .smaller import Smaller
 
 Array = np.ndarray
 ACTS = {  # what has a row of constraints, by the kinds of rows
@@ -44,6 +37,40 @@ def actuators(model: mujoco.MjModel) -> dict[str, tuple[slice, slice]]:
     return places
 
 
+class Roll(NamedTuple):
+    """A motion of a Stepper's model: from a state, with controls at each step, (steps, nu), None: the state's."""
+
+    name: str
+    state: Array
+    steps: int
+    controls: Array | None = None
+
+
+def carried(roll: Roll, whole: Stepper, stepper: Stepper, from_key: bool = False) -> Roll:
+    """The motion of a whole model for another one: what both have is the same by its name.
+
+    from_key: it starts at the keyframe of its name instead.
+    """
+    m, here, there = stepper.model, stepper.put(stepper.reset), whole.put(roll.state)
+    here.time, of_joints, of_actuators = there.time, joints(whole.model), actuators(whole.model)
+    here.mocap_pos[:], here.mocap_quat[:] = there.mocap_pos, there.mocap_quat
+    for name, (q, v) in joints(m).items():
+        whole_q, whole_v = of_joints[name]
+        here.qpos[q], here.qvel[v] = there.qpos[whole_q], there.qvel[whole_v]
+        here.qfrc_applied[v] = there.qfrc_applied[whole_v]
+    columns = list[int]()
+    for name, (u, act) in actuators(m).items():
+        whole_u, whole_act = of_actuators[name]
+        here.ctrl[u], here.act[act] = there.ctrl[whole_u], there.act[whole_act]
+        columns += range(whole_u.start, whole_u.stop)
+    if from_key:
+        forces = here.qfrc_applied.copy()
+        mujoco.mj_resetDataKeyframe(m, here, m.key(roll.name).id)
+        here.qfrc_applied[:] = forces
+    controls = None if roll.controls is None else np.take(roll.controls, columns, axis=1)
+    return Roll(roll.name, stepper.state(), roll.steps, controls)
+
+
 class Path(NamedTuple):
     """Where a motion of a model leads: q, (n + 1, nq), and v, (n + 1, nv); NaN from where it fails."""
 
@@ -52,53 +79,9 @@ class Path(NamedTuple):
     v: Array
 
 
-class Repeated:
-    """A motion of a whole model, repeated by a smaller one.
-
-    whole, state: from where, by a Stepper of the whole model. steps: how many. controls: at each step, (steps,
-    nu) of the whole model; None: those of the state. key: a keyframe of the model from which it starts instead.
-    What both have is the same by its name.
-    """
-
-    def __init__(
-        self, stepper: Stepper, whole: Stepper, state: Array, steps: int, controls: Array | None = None,
-        key: str = "",
-    ) -> None:  # fmt: skip
-        self.stepper, self.steps, self.controls = stepper, steps, None
-        m, here, there = stepper.model, stepper.put(stepper.reset), whole.put(state)
-        here.time, of_joints, of_actuators = there.time, joints(whole.model), actuators(whole.model)
-        here.mocap_pos[:], here.mocap_quat[:] = there.mocap_pos, there.mocap_quat
-        for name, (q, v) in joints(m).items():
-            whole_q, whole_v = of_joints[name]
-            here.qpos[q], here.qvel[v] = there.qpos[whole_q], there.qvel[whole_v]
-            here.qfrc_applied[v] = there.qfrc_applied[whole_v]
-        columns = list[int]()
-        for name, (u, act) in actuators(m).items():
-            whole_u, whole_act = of_actuators[name]
-            here.ctrl[u], here.act[act] = there.ctrl[whole_u], there.act[whole_act]
-            columns += range(whole_u.start, whole_u.stop)
-        if key:
-            forces = here.qfrc_applied.copy()
-            mujoco.mj_resetDataKeyframe(m, here, m.key(key).id)
-            here.qfrc_applied[:] = forces
-        if controls is not None:
-            self.controls = np.take(controls, columns, axis=1)
-        self.state = stepper.state()
-
-    def path(self) -> Path:
-        rolled, start = self.stepper.roll(self.state, self.steps, self.controls), self.stepper.put(self.state)
-        return Path(
-            self.stepper.model, np.vstack([start.qpos, rolled.q[0]]), np.vstack([start.qvel, rolled.v[0]])
-        )
-
-    def watched(self) -> Iterator[mujoco.MjData]:
-        """The data after each step; see Stepper.watch."""
-
-        def act(step: int, data: mujoco.MjData) -> None:
-            if self.controls is not None:
-                data.ctrl[:] = self.controls[step]
-
-        return self.stepper.watch(self.state, self.steps, act)
+def path_of(stepper: Stepper, roll: Roll) -> Path:
+    rolled, start = stepper.roll(*roll[1:]), stepper.put(roll.state)
+    return Path(stepper.model, np.vstack([start.qpos, rolled.q[0]]), np.vstack([start.qvel, rolled.v[0]]))
 
 
 def places_of(path: Path, names: Iterable[str]) -> Array:
@@ -159,12 +142,12 @@ class Use(NamedTuple):
         }
 
 
-def used(motions: Sequence[Repeated], paths: Sequence[Path]) -> Use:
+def used(stepper: Stepper, rolls: Sequence[Roll], paths: Sequence[Path]) -> Use:
     """What the motions of a model use, step by step; paths: where they lead."""
-    m, most_rows, forces = motions[0].stepper.model, 0, np.zeros_like(motions[0].stepper.data.actuator_force)
+    m, most_rows, forces = stepper.model, 0, np.zeros_like(stepper.data.actuator_force)
     pairs, rows = set[tuple[int, int]](), set[tuple[int, int]]()
-    for motion in motions:
-        for d in motion.watched():
+    for roll in rolls:
+        for d in stepper.watch(roll.state, roll.steps, roll.controls):
             pairs.update(map(tuple, np.sort(d.contact.geom, axis=1).tolist()))
             acts = (d.efc_force != 0.0) | (d.efc_type != ACTS["equality"][0])
             rows.update(zip(d.efc_type[acts].tolist(), d.efc_id[acts].tolist()))
@@ -195,96 +178,3 @@ def acting(m: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
     return found | {
         f"limit of {element_name(m, LIMITS[kind], owner)}" for kind, owner in rows if kind in LIMITS
     }
-
-
-class Roll(NamedTuple):
-    """What Stepper.roll takes: a state of the whole model; controls at each step, (steps, nu), None: its own."""
-
-    name: str
-    state: Array
-    steps: int
-    controls: Array | None = None
-
-
-@dataclass
-class Scene:
-    """Motions of a whole model by its own step and integrator.
-
-    points: sites whose places count too. small: what is left of the model, None: all.
-    """
-
-    tree: tmt.Tree
-    whole: "Smaller"
-    stepper: Stepper
-    rolls: Sequence[Roll]
-    points: tuple[str, ...] = ()
-    small: "Smaller | None" = None
-
-    @property
-    def left(self) -> "Smaller":
-        return self.small or self.whole
-
-    @property
-    def name(self) -> str:
-        return "; ".join(roll.name for roll in self.rolls)
-
-    @property
-    def duration(self) -> float:
-        return self.stepper.dt * sum(roll.steps for roll in self.rolls)
-
-    def repeated(self, small: "Smaller", from_keys: bool = False) -> list[Repeated]:
-        """Its motions by a smaller model. from_keys: from the keyframes of their names."""
-        stepper = Stepper(small.model, self.stepper.dt, self.stepper.integrator)
-        return [
-            Repeated(stepper, self.stepper, *roll[1:], key=roll.name if from_keys else "")
-            for roll in self.rolls
-        ]
-
-    def run(self, small: "Smaller", from_keys: bool = False) -> list[Path]:
-        return [motion.path() for motion in self.repeated(small, from_keys)]
-
-    def timed(self, small: "Smaller") -> Callable[[], object]:
-        """The same as one call, to be timed."""
-        loops = [
-            motion.stepper.loop(motion.state, motion.steps, motion.controls)
-            for motion in self.repeated(small)
-        ]
-        return lambda: [loop() for loop in loops]
-
-    @cached_property
-    def paths(self) -> list[Path]:
-        """Of the whole model."""
-        return self.run(self.whole)
-
-    @property
-    def is_finite(self) -> bool:
-        return all(np.isfinite(path.q).all() for path in self.paths)
-
-    @cached_property
-    def use(self) -> Use:
-        return used(self.repeated(self.whole), self.paths)
-
-    def error(self, small: "Smaller", from_keys: bool = False) -> float:
-        """How far a model is from the whole one, rad or m; inf where its run fails."""
-        return apart(self.run(small, from_keys), self.paths, self.points)
-
-    def recipe(self, small: "Smaller", file: str, error: float) -> dict[str, Any] | None:
-        """How plain MuJoCo repeats the error of a file with a smaller model, rad or m; None: controls change on the way.
-
-        places: of the whole model's positions, those that the smaller one has. Each motion starts from a keyframe of its name.
-        """
-        if self.points or any(roll.controls is not None for roll in self.rolls):
-            return None
-        of_whole = joints(self.whole.model)
-        places = [k for name in joints(small.model) for k in range(self.whole.model.nq)[of_whole[name][0]]]
-        return {
-            "file": file, "dt": self.stepper.dt, "integrator": self.stepper.integrator, "places": places, "error": error,
-            "motions": [
-                {"key": roll.name, "steps": roll.steps, "start": self.stepper.as_fields(roll.state)} for roll in self.rolls
-            ],
-        }  # fmt: skip
-
-    def starts(self, small: "Smaller") -> Iterator[tuple[str, mujoco.MjData]]:
-        """The names of the motions, and in turn the data of a model at their starts."""
-        for roll, repeated in zip(self.rolls, self.repeated(small)):
-            yield roll.name, repeated.stepper.put(repeated.state)

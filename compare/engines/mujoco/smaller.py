@@ -1,20 +1,18 @@
-"""Files made of a file: smaller ones, without what a motion does not use; and with other inertial numbers."""
+"""Smaller models of a file: without what a motion does not use, and with joints locked."""
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from tmt.export.parameters import PAYLOAD, SIZES, Parameters
-from tmt.model.tree import Tree
-
+from .changes import state_as_compiled
 from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
 from .motion import Use, joints
 from .names import bit, element_name, kind_of, parts_of
-from .source import Source, delete_textures, is_from_geoms, without_visuals
+from .source import Source, delete_textures, is_from_geoms
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
@@ -204,48 +202,3 @@ def finished(small: Smaller, starts: Iterable[tuple[str, mujoco.MjData]]) -> Sma
         state = {"qpos": data.qpos, "qvel": data.qvel, "act": data.act, "ctrl": data.ctrl}
         spec.add_key(name=name, time=data.time, **state, **places)
     return Smaller(spec)
-
-
-def changed(
-    source: Source, tree: Tree, parameters: Parameters, values: Mapping[str, np.ndarray]
-) -> mujoco.MjModel:
-    """A file with other inertial numbers, gravity and payload; values: of the parameters by name."""
-    assert source.spec is not None
-    spec, model = without_visuals(source.spec), source.model
-    state_as_compiled(spec, model, source.bodies)
-    bodies = {element_name(model, "body", number): body for body, number in zip(spec.bodies, source.bodies)}
-    if parameters.has_payload:
-        carrier = bodies[tree.body_names[parameters.carriers[-1]]]
-        load = carrier.add_body(name=PAYLOAD)
-        mass, com, inertia = (values[f"{PAYLOAD}_{part}"] for part in SIZES)
-        state_inertial(load, mass[0], com)
-        load.fullinertia = inertia
-    for name, (part, number) in parameters.places.items():
-        if number == len(tree.mass):
-            continue
-        body = bodies[tree.body_names[number]]
-        if part == "mass":
-            body.mass = values[name][0]
-        elif part == "com":
-            body.ipos = values[name]
-        else:
-            body.iquat, body.inertia = [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
-            body.fullinertia = values[name]
-    if "gravity" in values:
-        spec.option.gravity = values["gravity"]
-    return compiled(spec)
-
-
-def state_as_compiled(spec: mujoco.MjSpec, model: mujoco.MjModel, numbers: Sequence[int]) -> None:
-    """State the inertias of all bodies, whose numbers in the model are given, as they were compiled."""
-    for body, number in zip(spec.bodies[1:], numbers[1:]):
-        state_inertial(body, model.body_mass[number], model.body_ipos[number])
-        body.iquat, body.inertia = model.body_iquat[number], model.body_inertia[number]
-        body.fullinertia = np.full(6, np.nan)
-    spec.compiler.inertiafromgeom = int(mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE)
-    spec.compiler.settotalmass = -1.0
-
-
-def state_inertial(body: mujoco.MjsBody, mass: float, com: np.ndarray) -> None:
-    body.mass, body.ipos, body.explicitinertial = mass, com, True
-    body.ialt.type = mujoco.mjtOrientation.mjORIENTATION_QUAT

@@ -12,7 +12,6 @@ from .actuators import held_at, ranges_of
 from .names import INTEGRATORS, SETTLING, bit, control_of, element_name
 
 Array = np.ndarray
-Act = Callable[[int, mujoco.MjData], None]  # before a step: its number, and the data to read and change
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION  # all that a step depends on
 PHYSICS = mujoco.mjtState.mjSTATE_FULLPHYSICS  # the part that mujoco.rollout gives after each step
 PARTS = {
@@ -125,16 +124,16 @@ class Stepper:
 
     # runs
 
-    def watch(self, state: Array, steps: int, act: Act | None = None) -> Iterator[mujoco.MjData]:
+    def watch(self, state: Array, steps: int, controls: Array | None = None) -> Iterator[mujoco.MjData]:
         """The data after each step of a run from a state, (n,), until MuJoCo finds a bad number.
 
-        act: called before each step with its number, from 0, and the data, whose controls it may set. Derived
+        controls: at each step, (steps, nu); None: those of the state, which may be changed on the way. Derived
         fields (contacts, forces, accelerations) are of the state before the step.
         """
         self.put(state)
         for step in range(steps):
-            if act is not None:
-                act(step, self.data)
+            if controls is not None:
+                self.data.ctrl[:] = controls[step]
             mujoco.mj_step(self.model, self.data)
             if self.data.warning.number[BAD].any():
                 return
@@ -205,13 +204,8 @@ class Stepper:
 
     def go_on(self, path: Array, first: int, controls: Array | None) -> int:
         """Fill a path in from its step `first` on, from where the data are; how many steps it has then."""
-
-        def act(step: int, data: mujoco.MjData) -> None:
-            if controls is not None:
-                data.ctrl[:] = controls[first + step]
-
-        reached = first
-        for data in self.watch(self.state(), len(path) - first, act):
+        reached, rest = first, None if controls is None else controls[first:]
+        for data in self.watch(self.state(), len(path) - first, rest):
             mujoco.mj_getState(self.model, data, path[reached], PHYSICS)
             reached += 1
         return reached

@@ -16,7 +16,6 @@ from ...core.check import About, Result
 from ...core.text import block
 from ...core.timing import fastest
 from ...engines.mujoco import Mujoco
-from ...engines.mujoco.motion import Scene
 from ...engines.mujoco.reading import Reading, read
 from ...engines.mujoco.smaller import Smaller, of_parts
 from ...engines.mujoco.written import files_of
@@ -33,7 +32,7 @@ from ...stability.push import Pushed
 from ..options import ReductionOptions
 from ..setup import Setup
 from .records import JointRow, ModelRow, UseRow
-from .scene import scene_of, scene_of_case
+from .scene import Scene, scene_of, scene_of_case
 from .search import TEXT, Locks, lockable, take_out, written
 
 ERROR = 1e-3  # rad or m, if none is asked for

@@ -1,8 +1,16 @@
 """The motions that smaller models repeat: of a keyframe, recorded controls, a user's scenes, the arm's scenes."""
 
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import mujoco
 import numpy as np
 
-from ...engines.mujoco.motion import Roll, Scene
+import tmt
+
+from ...engines.mujoco.motion import Path, Roll, Use, apart, carried, joints, path_of, used
 from ...engines.mujoco.names import INTEGRATORS, element_name, joint_places, set_control
 from ...engines.mujoco.reading import Reading
 from ...engines.mujoco.smaller import Smaller, locked
@@ -14,6 +22,81 @@ from ..options import ReductionOptions
 from ..setup import Setup
 
 DURATION = 1.0  # s, of the motion from a keyframe
+
+
+@dataclass
+class Scene:
+    """Motions of a whole model by its own step and integrator.
+
+    points: sites whose places count too. left: what is left of the model.
+    """
+
+    tree: tmt.Tree
+    whole: Smaller
+    stepper: Stepper
+    rolls: Sequence[Roll]
+    points: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        self.left = self.whole
+
+    @property
+    def name(self) -> str:
+        return "; ".join(roll.name for roll in self.rolls)
+
+    @property
+    def duration(self) -> float:
+        return self.stepper.dt * sum(roll.steps for roll in self.rolls)
+
+    def carried(self, small: Smaller, from_keys: bool = False) -> Iterator[tuple[Stepper, Roll]]:
+        """Its motions by a smaller model. from_keys: from the keyframes of their names."""
+        stepper = Stepper(small.model, self.stepper.dt, self.stepper.integrator)
+        return ((stepper, carried(roll, self.stepper, stepper, from_keys)) for roll in self.rolls)
+
+    def run(self, small: Smaller, from_keys: bool = False) -> list[Path]:
+        return [path_of(*motion) for motion in self.carried(small, from_keys)]
+
+    def timed(self, small: Smaller) -> Callable[[], object]:
+        """The same as one call, to be timed."""
+        loops = [stepper.loop(*roll[1:]) for stepper, roll in self.carried(small)]
+        return lambda: [loop() for loop in loops]
+
+    @cached_property
+    def paths(self) -> list[Path]:
+        """Of the whole model."""
+        return [path_of(self.stepper, roll) for roll in self.rolls]
+
+    @property
+    def is_finite(self) -> bool:
+        return all(np.isfinite(path.q).all() for path in self.paths)
+
+    @cached_property
+    def use(self) -> Use:
+        return used(self.stepper, self.rolls, self.paths)
+
+    def error(self, small: Smaller, from_keys: bool = False) -> float:
+        """How far a model is from the whole one, rad or m; inf where its run fails."""
+        return apart(self.run(small, from_keys), self.paths, self.points)
+
+    def recipe(self, small: Smaller, file: str, error: float) -> dict[str, Any] | None:
+        """How plain MuJoCo repeats the error of a file with a smaller model, rad or m; None: controls change on the way.
+
+        places: of the whole model's positions, those that the smaller one has. Each motion starts from a keyframe of its name.
+        """
+        if self.points or any(roll.controls is not None for roll in self.rolls):
+            return None
+        of_whole, stepper = joints(self.whole.model), self.stepper
+        places = [k for name in joints(small.model) for k in range(self.whole.model.nq)[of_whole[name][0]]]
+        motions = [
+            {"key": roll.name, "steps": roll.steps, "start": stepper.as_fields(roll.state)} for roll in self.rolls
+        ]
+        step = {"dt": stepper.dt, "integrator": stepper.integrator}
+        return {"file": file, **step, "places": places, "error": error, "motions": motions}
+
+    def starts(self, small: Smaller) -> Iterator[tuple[str, mujoco.MjData]]:
+        """The names of the motions, and in turn the data of a model at their starts."""
+        for stepper, roll in self.carried(small):
+            yield roll.name, stepper.put(roll.state)
 
 
 def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:

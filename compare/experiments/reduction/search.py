@@ -7,12 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.text import block
-from ...engines.mujoco.motion import Path, Scene, joints
+from ...engines.mujoco.motion import Path, joints
 from ...engines.mujoco.names import kind_of
 from ...engines.mujoco.smaller import FREE, Smaller, finished, locked, tied_joints
 from ...engines.mujoco.source import Source
 from ...engines.mujoco.written import write
 from .records import FreeRow, JointRow
+from .scene import Scene
 
 TEXT = "reduction"  # the template
 DOES = {"slide": 0.02}  # m: a joint that moves more is what the scene is about
@@ -32,7 +33,7 @@ def take_out(scene: Scene) -> list[FreeRow]:
             continue
         if count:
             is_same = same_bits(scene.run(trial), scene.paths)
-            scene.small = trial if is_same else scene.left
+            scene.left = trial if is_same else scene.left
             rows.append(FreeRow(kind, count, is_same))
     return rows
 

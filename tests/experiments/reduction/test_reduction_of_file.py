@@ -261,7 +261,7 @@ def test_a_file_beyond_the_error_fails_and_a_model_that_moves_otherwise():
     for small, error, passed in ((arms.whole, 0.99e-3, (True, True)), (arms.whole, 1.01e-3, (True, False)),
                                  (heavier, 0.0, (False, True))):  # fmt: skip
         result, locks = Result("reduction"), search.Locks([], [], [([], small, 0.0)])
-        arms.small = small
+        arms.left = small
         reduction.add_checks(result, arms, locks, error, 1e-3)
         assert tuple(check.passed for check in result.checks) == passed
 

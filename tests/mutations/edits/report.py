@@ -84,7 +84,7 @@ EDITS = (
     # of a file's motion
     ("reduction.search", "take_out", "trial if is_same else scene.left", "trial", "what changes the motion is taken out"),
     ("reduction.search", "same_bits", "bits[0] == bits[1]", "True", "every motion is the same"),
-    ("mujoco.motion", "Repeated.__init__", "here.qfrc_applied[v] = _1", "pass", "forces that act all the time are lost"),
+    ("mujoco.motion", "carried", "here.qfrc_applied[v] = _1", "pass", "forces that act all the time are lost"),
     ("mujoco.motion", "apart", "np.isfinite(error)", "True", "a run that fails has no error"),
     ("mujoco.written", "exact", "repr(*found)", "word", "a written file has six digits"),
 )  # fmt: skip
