@@ -1,4 +1,4 @@
-"""Compiled models without locked joints, and with bodies that are welded, or have no mass, as one."""
+"""Compiled models without locked joints, with bodies that are welded, or have no mass, as one; what specs lose."""
 
 from collections.abc import Collection, Mapping
 
@@ -8,6 +8,7 @@ import numpy as np
 from ...robots.coordinates import point_inertia
 from .inventory import contact_pairs
 from .names import (
+    FROM_4,
     OF_A_JOINT,
     aligns,
     element_name,
@@ -232,3 +233,35 @@ def moves(body: mujoco.MjsBody) -> bool:
             return True
         body = body.parent
     return False
+
+
+def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
+    """A copy of a spec without what is only drawn; when compiled it has every body of the file.
+
+    A medium pushes geoms that touch nothing, and they may have the mass: there they stay.
+    """
+    spec = stated.copy()
+    spec.compiler.fusestatic = False  # fused bodies would only be renumbered
+    spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or is_from_geoms(spec))
+    delete_textures(spec)
+    return spec
+
+
+def delete_textures(spec: mujoco.MjSpec) -> int:
+    """Delete all textures, which are large in each copy of a model; how many there were.
+
+    Before MuJoCo 4 a material asks for the texture that it had: they stay.
+    """
+    if not FROM_4:
+        return 0
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    textures = list(spec.textures)
+    for texture in textures:
+        spec.delete(texture)
+    return len(textures)
+
+
+def is_from_geoms(spec: mujoco.MjSpec) -> bool:
+    """Whether geoms have the mass of some body, whatever its inertial says."""
+    return any(body.compiler.inertiafromgeom == FROM_GEOMS for body in spec.bodies)

@@ -17,10 +17,10 @@ from ...core.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
-from .locked import compiled
+from .locked import compiled, is_from_geoms
 from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
-from .source import Source, is_from_geoms, is_urdf
+from .source import Source, is_urdf
 
 # of the equations of motion
 STATED_FLAGS = {"flag gravity": "GRAVITY", "flag damper": "DAMPER", "flag eulerdamp": "EULERDAMP"}

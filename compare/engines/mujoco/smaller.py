@@ -9,10 +9,19 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from .changes import state_as_compiled
-from .locked import Positions, compiled, compiled_without, delete_geoms, delete_named
-from .motion import Use, joints
+from .locked import (
+    Positions,
+    compiled,
+    compiled_without,
+    delete_geoms,
+    delete_named,
+    delete_textures,
+    is_from_geoms,
+)
+from .motion import Roll, Use, joints
 from .names import bit, element_name, kind_of, parts_of
-from .source import Source, delete_textures, is_from_geoms
+from .source import Source
+from .stepper import Stepper
 
 NAMED = {  # the elements that are known by their names, and their kinds in a compiled model
     "geoms": "geom", "joints": "joint", "actuators": "actuator", "tendons": "tendon",
@@ -192,13 +201,14 @@ def of_parts(model: mujoco.MjModel, positions: Mapping[str, np.ndarray]) -> Posi
     return at
 
 
-def finished(small: Smaller, starts: Iterable[tuple[str, mujoco.MjData]]) -> Smaller:
-    """With starts of motions as its only keyframes, by their names."""
+def finished(small: Smaller, motions: Iterable[tuple[Stepper, Roll]]) -> Smaller:
+    """With the starts of its motions as its only keyframes, by their names."""
     spec = small.spec.copy()
     for key in list(spec.keys):
         spec.delete(key)
-    for name, data in starts:
+    for stepper, roll in motions:
+        data = stepper.put(roll.state)
         places = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()}
         state = {"qpos": data.qpos, "qvel": data.qvel, "act": data.act, "ctrl": data.ctrl}
-        spec.add_key(name=name, time=data.time, **state, **places)
+        spec.add_key(name=roll.name, time=data.time, **state, **places)
     return Smaller(spec)

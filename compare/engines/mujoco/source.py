@@ -21,8 +21,8 @@ import numpy as np
 
 from ...process.files import is_pipe, named_by, needed_by
 from . import locked
-from .locked import FROM_GEOMS, Positions, compiled, gives_inertia
-from .names import FROM_4, moving
+from .locked import Positions, compiled, gives_inertia, is_from_geoms, without_visuals
+from .names import moving
 
 # by MuJoCo, of a mesh that is not there or in another format
 UNREAD = ("Error opening file", "no decoder found")
@@ -273,38 +273,6 @@ def leave_out(spec: mujoco.MjSpec, missing: Collection[str]) -> None:
         name = repr(geom.parent.name) if geom.parent.name else f"{body}, which has no name,"
         raise ValueError(f"the inertia of body {name} is that of its mesh {file}, which cannot be read")
     locked.delete_geoms(spec, geoms)
-
-
-def without_visuals(stated: mujoco.MjSpec) -> mujoco.MjSpec:
-    """A copy of a spec without what is only drawn; when compiled it has every body of the file.
-
-    A medium pushes geoms that touch nothing, and they may have the mass: there they stay.
-    """
-    spec = stated.copy()
-    spec.compiler.fusestatic = False  # fused bodies would only be renumbered
-    spec.compiler.discardvisual = not (spec.option.density or spec.option.viscosity or is_from_geoms(spec))
-    delete_textures(spec)
-    return spec
-
-
-def delete_textures(spec: mujoco.MjSpec) -> int:
-    """Delete all textures, which are large in each copy of a model; how many there were.
-
-    Before MuJoCo 4 a material asks for the texture that it had: they stay.
-    """
-    if not FROM_4:
-        return 0
-    for material in spec.materials:
-        material.textures = [""] * len(material.textures)
-    textures = list(spec.textures)
-    for texture in textures:
-        spec.delete(texture)
-    return len(textures)
-
-
-def is_from_geoms(spec: mujoco.MjSpec) -> bool:
-    """Whether geoms have the mass of some body, whatever its inertial says."""
-    return any(body.compiler.inertiafromgeom == FROM_GEOMS for body in spec.bodies)
 
 
 def moving_mass(model: mujoco.MjModel) -> float:

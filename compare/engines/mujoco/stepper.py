@@ -66,8 +66,6 @@ class Stepper:
         self.places = {name: slice(end - size, end) for (name, size), end in zip(sizes.items(), ends)}
         self.reset = self.state()  # as mj_resetData leaves it
 
-    # states
-
     def start(
         self, key: str = "", q: ArrayLike | None = None, v: ArrayLike | None = None,
         controls: ArrayLike | None = None,
@@ -121,8 +119,6 @@ class Stepper:
         data = self.put(state)
         names = "qpos", "qvel", "act", "ctrl", "mocap_pos", "mocap_quat", "qfrc_applied"
         return {name: getattr(data, name).ravel().tolist() for name in names if getattr(data, name).any()}
-
-    # runs
 
     def watch(self, state: Array, steps: int, controls: Array | None = None) -> Iterator[mujoco.MjData]:
         """The data after each step of a run from a state, (n,), until MuJoCo finds a bad number.
@@ -178,18 +174,17 @@ class Stepper:
         Rolling on from `Rolled.states` is the same as rolling on at once; a run that has ended ends at once.
         """
         m, starts = self.model, np.atleast_2d(np.asarray(states, float))
-        controls = None
+        rows: list[Array | None] = [None] * len(starts)
         if inputs is not None:
-            controls = np.broadcast_to(np.asarray(inputs, float), (len(starts), steps, m.nu))
+            rows = [*np.broadcast_to(np.asarray(inputs, float), (len(starts), steps, m.nu))]
         paths = np.full((len(starts), steps, 1 + m.nq + m.nv), np.nan)
         ends, ended = starts.copy(), np.full(len(starts), steps)
-        for k, start in enumerate(starts):
-            path = self.loop(start, steps, None if controls is None else controls[k])()
-            stopped = self.taken(path)
-            if stopped < steps and not self.data.warning.number[BAD].any():
-                stopped = self.go_on(path, stopped, None if controls is None else controls[k])
-            paths[k, :stopped] = path[:stopped, : paths.shape[2]]
-            ends[k], ended[k] = self.state(), stopped
+        for k, (start, controls) in enumerate(zip(starts, rows)):
+            path = self.loop(start, steps, controls)()[:, : paths.shape[2]]
+            if self.data.warning.number.any():  # the loop ends at any, a run where a number is bad
+                watched = [np.r_[d.time, d.qpos, d.qvel] for d in self.watch(start, steps, controls)]
+                path = np.reshape(watched, (-1, paths.shape[2]))
+            paths[k, : len(path)], ended[k], ends[k] = path, len(path), self.state()
         return Rolled(paths[:, :, 1 : 1 + m.nq], paths[:, :, 1 + m.nq :], ended, ends)
 
     def taken(self, path: Array) -> int:
@@ -201,16 +196,6 @@ class Stepper:
             return len(path)
         warned = int(np.argmax(path[:, 0] == path[-1, 0]))  # from here on the last state is repeated
         return warned if self.data.warning.number[BAD].any() else warned + 1
-
-    def go_on(self, path: Array, first: int, controls: Array | None) -> int:
-        """Fill a path in from its step `first` on, from where the data are; how many steps it has then."""
-        reached, rest = first, None if controls is None else controls[first:]
-        for data in self.watch(self.state(), len(path) - first, rest):
-            mujoco.mj_getState(self.model, data, path[reached], PHYSICS)
-            reached += 1
-        return reached
-
-    # derivatives
 
     @property
     def takes_transition(self) -> bool:
@@ -283,8 +268,8 @@ class Stepper:
 def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
     """The movement from positions to others, (..., nq) each: (..., nv) rad or m, of a ball in its own axes."""
     pairs = np.broadcast_arrays(q0, q1)
-    starts, ends = (np.ascontiguousarray(q, float).reshape(-1, m.nq) for q in pairs)
-    moved = np.zeros((len(starts), m.nv))
-    for row, start, end in zip(moved, starts, ends):
-        mujoco.mj_differentiatePos(m, row, 1.0, start, end)
+    rows = [np.ascontiguousarray(q, float).reshape(-1, m.nq) for q in pairs]
+    moved = np.zeros((len(rows[0]), m.nv))
+    for row, *ends in zip(moved, *rows):
+        mujoco.mj_differentiatePos(m, row, 1.0, *ends)
     return moved.reshape(*pairs[0].shape[:-1], m.nv)

@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from ...engines import Array, EngineRecord
 from ...engines.mujoco import read
+from ...engines.mujoco.locked import without_visuals
 from ...engines.mujoco.names import bit
-from ...engines.mujoco.source import ModelError, Source, without_visuals
+from ...engines.mujoco.source import ModelError, Source
 from ...engines.outside.bodies import Numbers, numbers_of, size_of
 from ...engines.outside.file import File
 from ...engines.outside.model import Reading

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import mujoco
 import numpy as np
 
 import tmt
@@ -92,11 +91,6 @@ class Scene:
         ]
         step = {"dt": stepper.dt, "integrator": stepper.integrator}
         return {"file": file, **step, "places": places, "error": error, "motions": motions}
-
-    def starts(self, small: Smaller) -> Iterator[tuple[str, mujoco.MjData]]:
-        """The names of the motions, and in turn the data of a model at their starts."""
-        for stepper, roll in self.carried(small):
-            yield roll.name, stepper.put(roll.state)
 
 
 def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:

@@ -115,5 +115,5 @@ def starts(scene: Scene) -> dict[str, tuple[float, ...]]:
 def written(scene: Scene, names: Sequence[str], path: File, comment: str) -> Smaller:
     """Write what is left with joints locked, with the starts of the motions as keyframes; what is read again."""
     small = locked(scene.left, {name: scene.use.middle[name] for name in names})
-    write(finished(small, scene.starts(small)).spec, path, comment)
+    write(finished(small, scene.carried(small)).spec, path, comment)
     return Smaller.whole(Source(path))

@@ -18,7 +18,7 @@ EDITS = (
     ("mujoco.actuators", "clipped", "np.clip(u[i], *m.actuator_ctrlrange[place])", "u[i]", "no range ends a control"),
     ("mujoco.actuators", "stated_controls", "len(keys[k].ctrl) > 0", "keys[k].ctrl.any()", "a stated zero is none"),
     ("case", "Case.controller", "self.robot.coordinates.from_degrees(_1, positions=False)", "_1", "targets are moved by radians"),
-    ("mujoco.stepper", "Stepper.roll", "self.data.warning.number[BAD].any()", "True", "a full memory ends a run"),
+    ("mujoco.stepper", "Stepper.roll", "self.data.warning.number.any()", "False", "a full memory ends a run"),
     ("mujoco.stepper", "Stepper.taken", "int(np.argmax(_1))", "len(path) - 1", "steps in which time stands still are taken"),
     ("mujoco.dynamics", "MujocoDynamics.prepare", "stepper.taken(physics)", "len(physics)",
      "a prepared run goes on where time stands still"),
