@@ -153,6 +153,13 @@ def check_acceleration(result: Result, comparisons: Sequence[Comparison]) -> Non
         comparison.agree(f"tau from MuJoCo's qdd by {result.label}", torques, back, tau, closing)
         back = mujoco.inverse(q, qd, qdd)
         comparison.agree(f"tau from {whose} qdd by mj_inverse", torques, tau, back, closing)
+        if not robot.own and comparison is comparisons[0]:
+            C, Y = literal.coriolis_matrix(tree, q, qd), literal.regressor(tree, q, qd, qdd)
+            moving = np.einsum("sij,sj->si", C, qd) + literal.gravity_balance(tree, q)
+            size = np.einsum("sij,sj->si", scale.coriolis_matrix, np.abs(qd)) + scale.weight
+            comparison.agree("bias from C qd", torques, moving, mujoco.bias(q, qd), size)
+            of_bodies = Y @ tree.inertial_parameters + np.array(tree.armature) * qdd + drag + springs
+            comparison.agree("tau from Y theta", torques, of_bodies, back, closing)
         if "energy" in robot.own:  # which may be zero at any position
             zero = np.array(tree.zero)[None], np.zeros((1, tree.coordinates.nv))
             above, mujoco_above = (side.energy(q, qd) - side.energy(*zero) for side in (engine, mujoco))

@@ -24,7 +24,9 @@ FIRST_CAUSES = 4  # on the first screen
 TITLES = {"what_should_i_use": "What should I use?", "engines_answer": "Which engine?"}  # of tables
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
-OF_TABLES = {name: getattr(tables, name) for name in ("of_cells", "of_rows", "of_checks", "of_causes", "of_origin")}
+OF_TABLES = {
+    name: getattr(tables, name) for name in ("of_cells", "of_rows", "of_checks", "of_causes", "of_origin")
+}
 
 
 class Picture(NamedTuple):
@@ -66,11 +68,18 @@ class Document:
     def tolerances(self) -> str:
         """A page with the formulas of the tolerances."""
         sections = [section for section in self.report.sections if section.tolerance]
-        parts = [f"# Tolerances of {escaped(self.title)}", escaped(say(Finding("introduction", "tolerances")))]
+        parts = [
+            f"# Tolerances of {escaped(self.title)}",
+            escaped(say(Finding("introduction", "tolerances"))),
+        ]
         for section in sections:
             texts = section.title, " ".join(section.formulas.split())
-            parts.append('<section id="{}">\n\n## {}\n\n{}\n\n</section>'.format(section.name, *map(escaped, texts)))
-        return page_of("Tolerances", "\n\n".join(parts), True, [(section.name, False) for section in sections])
+            parts.append(
+                '<section id="{}">\n\n## {}\n\n{}\n\n</section>'.format(section.name, *map(escaped, texts))
+            )
+        return page_of(
+            "Tolerances", "\n\n".join(parts), True, [(section.name, False) for section in sections]
+        )
 
     def explained(self) -> list[tuple[pd.DataFrame, str, int]]:
         """What explains that checks fail, else the first of them, as a table with its title and how many more there are."""

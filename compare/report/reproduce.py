@@ -35,7 +35,9 @@ def worst_states(rows: Sequence[Any], plain: Mapping[str, Any]) -> list[dict[str
     """The worst state of each quantity of an experiment."""
     compared = [row for row in rows if hasattr(row, "mujoco_value") and row.worst_difference is not None]
     groups = ([row for row in compared if row.quantity == quantity] for quantity in QUANTITIES)
-    return [state(max(group, key=lambda row: row.difference_over_bar or 0.0), plain) for group in groups if group]
+    return [
+        state(max(group, key=lambda row: row.difference_over_bar or 0.0), plain) for group in groups if group
+    ]
 
 
 def state(row: Any, plain: Mapping[str, Any]) -> dict[str, Any]:

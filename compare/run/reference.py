@@ -103,7 +103,9 @@ def compared_with(
     except OwnError as error:
         raise OwnError(f"{error}. {reference.loop}" if loop else str(error)) from None
     robot = replace(robot, own=tuple(own.equations.functions))
-    return Compared(reference._replace(kind="own", source=in_one_line(asked), own=own), robot, mujoco, reading)
+    return Compared(
+        reference._replace(kind="own", source=in_one_line(asked), own=own), robot, mujoco, reading
+    )
 
 
 def reference_of(kind: str, source: Source, shown: str, found: Sequence[Finding]) -> Reference:

@@ -20,7 +20,15 @@ KINDS = {  # of elements, by the prefix of the fields that have their numbers
 PREFIXES = {kind: prefix for prefix, kind in KINDS.items()}  # by the tag
 OF_INERTIAL = {"pos": "body_ipos", "quat": "body_iquat", "mass": "body_mass", "diaginertia": "body_inertia"}
 OF_SPEEDS = ("damping", "armature", "frictionloss")
-OTHERS = ("wrap_prm", "pair_solref", "pair_solimp", "pair_friction", "pair_margin", "mesh_scale", "hfield_size")
+OTHERS = (
+    "wrap_prm",
+    "pair_solref",
+    "pair_solimp",
+    "pair_friction",
+    "pair_margin",
+    "mesh_scale",
+    "hfield_size",
+)
 TAG, VALUES = re.compile(r"<(\w+) [^>]*>"), re.compile(r'(\w+)="([^"]*\d[^"]*)"')
 NAME, TEXTS = re.compile(r'(name)="([^"]*)"'), ("name", "file", "mesh", "class", "childclass")
 
@@ -70,7 +78,11 @@ def with_all_digits(text: str, spec: mujoco.MjSpec, model: mujoco.MjModel) -> st
         def in_value(value: re.Match[str]) -> str:
             if value[1] in TEXTS:
                 return value[0]
-            field = OF_INERTIAL.get(value[1], "") if kind == "inertial" else f"{PREFIXES.get(kind, '')}_{value[1]}"
+            field = (
+                OF_INERTIAL.get(value[1], "")
+                if kind == "inertial"
+                else f"{PREFIXES.get(kind, '')}_{value[1]}"
+            )
             numbers = fields.get((name, field)) or fields.get((name, "")) or fields["", ""]
             return f'{value[1]}="{" ".join(exact(word, numbers) for word in value[2].split(" "))}"'
 
@@ -104,7 +116,11 @@ def numbers_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[tuple[str, st
             for number, row in enumerate(values):
                 add(element_name(model, KINDS[prefix], number), field, row)
     for joint in range(model.njnt):
-        name, place, dof = element_name(model, "joint", joint), model.jnt_qposadr[joint], model.jnt_dofadr[joint]
+        name, place, dof = (
+            element_name(model, "joint", joint),
+            model.jnt_qposadr[joint],
+            model.jnt_dofadr[joint],
+        )
         numbers = {"ref": model.qpos0[place], "springref": model.qpos_spring[place]}
         numbers |= {name: getattr(model, f"dof_{name}")[dof] for name in OF_SPEEDS}
         for field, value in numbers.items():
@@ -112,6 +128,9 @@ def numbers_of(spec: mujoco.MjSpec, model: mujoco.MjModel) -> dict[tuple[str, st
     for geom in spec.geoms:
         add(geom.name, "geom_mass", geom.mass)
     options = [name for name in dir(model.opt) if not name.startswith("_")]
-    for values in (*(getattr(model, name) for name in OTHERS), *(getattr(model.opt, name) for name in options)):
+    for values in (
+        *(getattr(model, name) for name in OTHERS),
+        *(getattr(model.opt, name) for name in options),
+    ):
         add("", "", values)
     return found

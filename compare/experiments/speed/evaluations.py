@@ -32,7 +32,9 @@ class EvaluationRow(Row):
     operations_per_ns: float | None = None
 
 
-Loop = tuple[EvaluationRow, Callable[[int], object]]  # a way to evaluate: its row, and run(count), which repeats it
+Loop = tuple[
+    EvaluationRow, Callable[[int], object]
+]  # a way to evaluate: its row, and run(count), which repeats it
 
 
 def loops(setup: Setup) -> list[Loop]:
