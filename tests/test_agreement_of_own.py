@@ -130,7 +130,9 @@ def test_a_function_is_called_once_at_each_state():
 @pytest.mark.parametrize("share, passes", [(1e-3, True), (0.4, False)])
 def test_rtol_is_of_the_values_of_an_entry_wherever_its_terms_are(share, passes):
     """Aloft the terms of M are large; one entry at one state of many that is off by a third of it does not pass."""
-    aloft = PENDULUM.replace("<worldbody>", '<worldbody><body pos="0 0 20">').replace("</worldbody>", "</body></worldbody>")
+    aloft = PENDULUM.replace("<worldbody>", '<worldbody><body pos="0 0 20">').replace(
+        "</worldbody>", "</body></worldbody>"
+    )
     q = np.random.default_rng(4).uniform(-1.0, 1.0, (50, 2))
     M = np.array([mass_matrix(row) for row in q])
     M[7, 1, 1] *= 1.0 + share

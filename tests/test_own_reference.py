@@ -78,17 +78,29 @@ def test_one_slip_is_one_cause_beneath_the_first_experiment_that_differs(folder,
     """What explains the same is beneath it, and what own equations do not serve is one line."""
     with pytest.MonkeyPatch.context() as patch, without_workers():
         for module in (command, command_line, experiment):
-            patch.setattr(module, "EXPERIMENTS", {name: EXPERIMENTS[name] for name in (*STATIC, *OTHERS[:3], "diagnosis")})
-        status, out, _ = answered(["all", "--quick", "--mjcf", "double.xml", "--reference", "mine.py:sign"], capsys)
+            patch.setattr(
+                module,
+                "EXPERIMENTS",
+                {name: EXPERIMENTS[name] for name in (*STATIC, *OTHERS[:3], "diagnosis")},
+            )
+        status, out, _ = answered(
+            ["all", "--quick", "--mjcf", "double.xml", "--reference", "mine.py:sign"], capsys
+        )
     lines, words = out.splitlines(), [line.split()[:2] for line in out.splitlines() if line]
     at = words.index(["acceleration", "differs"])
-    assert status == 1 and words[at + 1] == ["CAUSE", "h[hip],"] and sum(line[0] == "CAUSE" for line in words) == 1
+    assert (
+        status == 1
+        and words[at + 1] == ["CAUSE", "h[hip],"]
+        and sum(line[0] == "CAUSE" for line in words) == 1
+    )
     assert ["double.xml", "and"] in words and "3 experiments need more than mass_matrix and bias." in lines
     assert "With the cause mended, M and h agree at all 24 states of the search." in lines
     assert not {"parameters", "FAIL"} & {line[0] for line in words} and max(map(len, lines)) <= 100
     (cause,) = json.loads(Path("reports/latest/results.json").read_text())["causes"]
     alone = cause["text"].split("; or ")
-    assert len(alone) > 1 and [line.strip() for line in lines if line.startswith("     or ")] == [f"or {x}" for x in alone[1:]]
+    assert len(alone) > 1 and [line.strip() for line in lines if line.startswith("     or ")] == [
+        f"or {x}" for x in alone[1:]
+    ]
 
 
 def test_torques_that_act_with_gears_are_one_cause_in_words(folder):

@@ -32,7 +32,9 @@ def test_it_is_short_and_has_all_that_it_links():
 
 def test_the_example_workflow_runs_what_the_readme_shows():
     text = (ROOT / ".github" / "example" / "models.yml").read_text(encoding="utf-8")
-    assert re.findall(r"run: (python -m compare .*)", text) == re.findall(r"(?m)^python -m compare all .*urdf .*$", README)
+    assert re.findall(r"run: (python -m compare .*)", text) == re.findall(
+        r"(?m)^python -m compare all .*urdf .*$", README
+    )
 
 
 def table(name):

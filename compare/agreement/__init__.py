@@ -34,7 +34,7 @@ class Difference(NamedTuple):
 
     Attributes
     ----------
-    quantity : {"mass_matrix", "bias", "gravity", "acceleration"}
+    quantity : {"mass_matrix", "bias", "C qd", "C + C'", "gravity", "acceleration"}
     entry : str
         Such as "M[hip][knee]" or "h[hip]".
     state : State
@@ -67,6 +67,7 @@ def assert_agrees(
     *,
     mass_matrix: Quantity = None,
     bias: Quantity = None,
+    coriolis_matrix: Quantity = None,
     gravity: Quantity = None,
     acceleration: Quantity = None,
     q: Values = None,
@@ -86,9 +87,11 @@ def assert_agrees(
     ----------
     mjcf : path, MJCF text or MjModel
         Its contacts, limits, actuators and equalities are switched off.
-    mass_matrix, bias, gravity, acceleration : optional, at least one
-        mass_matrix(q), bias(q, qd), gravity(q), acceleration(q, qd, tau): a function of one state,
-        the array of its values at the given q, qd, tau, or a pair of a SymPy matrix and its list of symbols.
+    mass_matrix, bias, coriolis_matrix, gravity, acceleration : optional, at least one
+        mass_matrix(q), bias(q, qd), coriolis_matrix(q, qd), gravity(q), acceleration(q, qd, tau): a function of one
+        state, the array of its values at the given q, qd, tau, or a pair of a SymPy matrix and its list of symbols.
+        Of a Coriolis matrix C, which M and h do not determine, C qd is compared with bias - gravity, and C + C' with
+        dM/dt: dM/dt - 2 C is then skew.
     q, qd, tau : (N, nq), (N, nv), (N, nv), optional
         The states, in your joints; None: `states` random states from `seed`, within the joints' ranges.
     joints : sequence of str, optional
@@ -120,7 +123,10 @@ def assert_agrees(
     AssertionError: Not equal to MuJoCo to tolerance 64 eps x the scale of each entry...
     """
     __tracebackhide__ = True  # pytest shows the line of the test
-    quantities = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}
+    quantities = {
+        "mass_matrix": mass_matrix, "bias": bias, "coriolis_matrix": coriolis_matrix, "gravity": gravity,
+        "acceleration": acceleration,
+    }  # fmt: skip
     comparison = Comparison(mjcf, quantities, q, qd, tau, joints, rtol, states, seed)
     if comparison.fails or comparison.problems:
         raise AssertionError(message(comparison))
@@ -131,6 +137,7 @@ def differences(
     *,
     mass_matrix: Quantity = None,
     bias: Quantity = None,
+    coriolis_matrix: Quantity = None,
     gravity: Quantity = None,
     acceleration: Quantity = None,
     q: Values = None,
@@ -145,7 +152,7 @@ def differences(
 
     Parameters
     ----------
-    mjcf, mass_matrix, bias, gravity, acceleration, q, qd, tau, joints, rtol, states, seed
+    mjcf, mass_matrix, bias, coriolis_matrix, gravity, acceleration, q, qd, tau, joints, rtol, states, seed
         As of `assert_agrees`, which also says what is raised.
 
     Returns
@@ -160,7 +167,10 @@ def differences(
     >>> print(worst.entry, worst.yours, round(worst.mujoco, 9), worst.ratio > 1.0)
     M[hip][hip] 0.5 0.6 True
     """
-    quantities = {"mass_matrix": mass_matrix, "bias": bias, "gravity": gravity, "acceleration": acceleration}
+    quantities = {
+        "mass_matrix": mass_matrix, "bias": bias, "coriolis_matrix": coriolis_matrix, "gravity": gravity,
+        "acceleration": acceleration,
+    }  # fmt: skip
     comparison = Comparison(mjcf, quantities, q, qd, tau, joints, rtol, states, seed)
     return rows(comparison, cause_of(comparison).text if comparison.fails else "")
 

@@ -10,13 +10,22 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
+from tmt import literal
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import shown
 
 from ..core.text import say
 from ..core.words import capital
 from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations, OwnError
-from ..engines.own.functions import converted, in_shape, in_words, is_function, numbers_of, state_in_words
+from ..engines.own.functions import (
+    Quantity,
+    converted,
+    in_shape,
+    in_words,
+    is_function,
+    numbers_of,
+    state_in_words,
+)
 from ..judge.agree import over, share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
@@ -25,7 +34,12 @@ from ..robots.joint_map import joint_map
 from ..robots.scene import is_number
 from ..robots.states import random
 
-SYMBOLS = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}  # of entries of quantities
+# what is compared of a Coriolis matrix, which Mbar and h do not determine: its product, and its symmetric part
+OF_CORIOLIS = {"C qd": Quantity(2, ("nv",)), "C + C'": Quantity(2, ("nv", "nv"))}
+COMPARED = QUANTITIES | OF_CORIOLIS
+# of entries of quantities
+SYMBOLS = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}
+SYMBOLS |= {"coriolis_matrix": "C", "C qd": "(C qd)", "C + C'": "(C + C')"}
 DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
 
@@ -40,7 +54,7 @@ class State(NamedTuple):
 
     def said(self, quantity: str) -> str:
         """What of the state a quantity depends on, as it can be typed."""
-        return state_in_words((self.q, self.qd, self.tau)[: QUANTITIES[quantity].arguments])
+        return state_in_words((self.q, self.qd, self.tau)[: COMPARED[quantity].arguments])
 
 
 class Compared(NamedTuple):
@@ -82,10 +96,12 @@ class Comparison:
     ) -> None:  # fmt: skip
         self.brought = {name: value for name, value in quantities.items() if value is not None}
         if not self.brought:
-            raise ValueError(f"nothing to compare: expected {', '.join(SYMBOLS)} or some of them")
+            expected = [name for name in SYMBOLS if name in QUANTITIES]
+            raise ValueError(f"nothing to compare: expected {', '.join(expected)} or some of them")
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
         self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
+        self.coriolis = np.zeros(0)  # the user's, (states, nv, nv)
         self.problems: list[str] = []  # other errors of the user's functions at the states, a line each
         self.read(mjcf)
         try:
@@ -105,7 +121,11 @@ class Comparison:
             self.equations = OwnEquations(functions, self.coordinates, self.joints, self.tree, ())
         if q is not None:
             self.take_states(q, qd, tau)
-            if np.ndim(qd) and not self.qd.any() and {"bias", "acceleration"} & {*self.brought}:
+            if (
+                np.ndim(qd)
+                and not self.qd.any()
+                and {"bias", "acceleration", "coriolis_matrix"} & {*self.brought}
+            ):
                 warnings.warn("qd is 0 at all states: no velocity terms are compared", stacklevel=4)
             if states != DEFAULT_STATES:
                 text = f"states={shown(states)} is not used: the {len(self.q)} states of q are compared"
@@ -173,13 +193,22 @@ class Comparison:
         for name, brought in self.brought.items():
             is_table = equations is None or not equations.has(name)
             values[name] = self.table(name, brought) if is_table else self.asked(equations, name)
+        if (C := values.pop("coriolis_matrix", None)) is not None:
+            self.coriolis = C
+            values["C qd"] = np.einsum("sij,sj->si", C, self.qd)
+            values["C + C'"] = C + C.swapaxes(1, 2)
         self.problems = [problem.text for problem in equations.problems] if equations is not None else []
         return values
 
     def asked(
         self, source: object, name: str, q: np.ndarray | None = None, qd: np.ndarray | None = None
     ) -> np.ndarray:
-        """A quantity of an engine at the states, or at others."""
+        """A quantity of an engine at the states, or at others; of a Coriolis matrix MuJoCo's bias, and dMbar/dt."""
+        if name == "C qd":
+            return self.mujoco.bias(self.q, self.qd) - self.mujoco.gravity_balance(self.q)
+        if name == "C + C'":
+            C = literal.coriolis_matrix(self.tree, self.q, self.qd)
+            return C + C.swapaxes(1, 2)
         state = self.q if q is None else q, self.qd if qd is None else qd, self.tau
         return np.asarray(getattr(source, METHOD_NAMES[name])(*state[: QUANTITIES[name].arguments]))
 
@@ -191,7 +220,8 @@ class Comparison:
             flat = in_shape(array, (count, nv * nv))
             brought = brought if flat is None else flat.reshape(count, nv, nv)
         values = converted(name, brought, shape, ", or a function", ", its values at the given q")
-        return self.joints.mass_matrix(values) if name == "mass_matrix" else self.joints.forces(values)
+        is_matrix = len(QUANTITIES[name].shape) == 2
+        return self.joints.mass_matrix(values) if is_matrix else self.joints.forces(values)
 
     @cached_property
     def right(self) -> dict[str, np.ndarray]:
@@ -227,7 +257,7 @@ class Comparison:
 
     def own(self, name: str) -> Callable[[np.ndarray], np.ndarray]:
         """Takes a quantity to the user's joints."""
-        return self.joints.own_mass_matrix if name == "mass_matrix" else self.joints.own_forces
+        return self.joints.own_mass_matrix if len(COMPARED[name].shape) == 2 else self.joints.own_forces
 
     def scale(self, name: str, right: np.ndarray) -> np.ndarray:
         """The scale of each entry of a quantity, in the model's joints. right: MuJoCo's values."""
@@ -238,12 +268,15 @@ class Comparison:
         except np.linalg.LinAlgError:
             text = "Mbar of the model is singular at a state: there is no acceleration to compare"
             raise ValueError(text) from None
+        if name in OF_CORIOLIS:
+            C = scale.coriolis_matrix
+            return 2.0 * C if name == "C + C'" else np.einsum("sij,sj->si", C, np.abs(self.qd)) + scale.weight
         return {"mass_matrix": scale.mass_matrix, "bias": scale.bias, "gravity": scale.weight}[name]
 
     def entries(self, name: str) -> dict[tuple[int, ...], str]:
         """The names of the entries of a quantity, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
-        places = product(range(len(names)), repeat=len(QUANTITIES[name].shape))
+        places = product(range(len(names)), repeat=len(COMPARED[name].shape))
         return {place: SYMBOLS[name] + "".join(f"[{names[i]}]" for i in place) for place in places}
 
     @property

@@ -9,7 +9,7 @@ from numpy import ndarray
 from ..core.finding import Finding
 from ..engines.own import QUANTITIES
 from ..judge.scale import EPS
-from .comparison import Compared, Comparison
+from .comparison import OF_CORIOLIS, Compared, Comparison
 
 FEW = 0.15  # of the rows, at most
 LEAST_ROWS = 8
@@ -24,7 +24,8 @@ def slips_of_tables(comparison: Comparison) -> list[Finding]:
     """What explains each table that differs; [] unless all that differs are tables, and each is explained."""
     failing = {name: compared for name, compared in comparison.compared.items() if compared.fails}
     equations = comparison.equations
-    are_tables = equations is None or not any(map(equations.has, failing))
+    are_tables = not OF_CORIOLIS.keys() & failing.keys()
+    are_tables &= equations is None or not any(map(equations.has, failing))
     if len(comparison.q) < LEAST_ROWS or not are_tables:
         return []
     findings = [next(slips_of_table(comparison, name, compared), None) for name, compared in failing.items()]

@@ -21,7 +21,7 @@ from ..diagnosis.noise import through_noise
 from ..engines.own import QUICK, OwnEquations
 from ..judge.entries import Entries
 from ..robots.coordinates import Coordinates
-from .comparison import Comparison
+from .comparison import OF_CORIOLIS, Comparison
 from .tables import slips_of_tables
 
 SECONDS_OF_CAUSE = 4.5  # of a search
@@ -235,12 +235,15 @@ def of_needed_forces(given: Given, left_over: LeftOver) -> Why:
 
 def cause_of(comparison: Comparison) -> Why:
     """The probable cause of what differs: slips of a table, else of its equations, else one number beside noise."""
+    failing = [name for name, compared in comparison.compared.items() if compared.fails]
+    if OF_CORIOLIS.keys() >= {*failing}:
+        return of_coriolis(comparison, failing)
     if slips := slips_of_tables(comparison):
         return Why(" ".join(map(say, slips)))
     which = some_states(comparison)
     if len(which) < min(LEAST_STATES, len(comparison.q)):
         return Why("", False)  # too few of them are numbers
-    failing = [name for name, compared in comparison.compared.items() if compared.fails]
+    failing = [name for name in failing if name not in OF_CORIOLIS]
     yours, tolerances = ({name: part[which] for name, part in parts.items()}
                          for parts in (comparison.values, comparison.tolerances))  # fmt: skip
     is_gravity = "bias" not in yours or ("gravity" in failing and "bias" not in failing)
@@ -255,6 +258,19 @@ def cause_of(comparison: Comparison) -> Why:
     found = why(Given.of(comparison.tree, values, *about))
     name = "acceleration" if failing == ["acceleration"] else of_h
     return found if found.is_found else of_noise(comparison, name) or found
+
+
+def of_coriolis(comparison: Comparison, failing: list[str]) -> Why:
+    """Which of its two laws a Coriolis matrix breaks, and whether its transpose or a multiple keeps them."""
+    products = comparison.compared["C qd"]
+    turned = comparison.coriolis.swapaxes(1, 2) @ comparison.qd[:, :, None]
+    off = np.abs(comparison.own("C qd")(turned[:, :, 0]) - products.right)
+    factor = float((products.yours * products.right).sum() / ((products.right**2).sum() or 1.0))
+    is_multiple = bool((np.abs(products.yours - factor * products.right) <= products.tolerance).all())
+    is_transposed = "C qd" in failing and bool((off <= products.tolerance).all())
+    is_multiple &= "C qd" in failing and not is_transposed
+    values = {"failing": failing, "is_transposed": is_transposed, "factor": factor if is_multiple else None}
+    return Why(say(Finding("agreement", "coriolis", values)), is_transposed or is_multiple)
 
 
 def some_states(comparison: Comparison) -> ndarray:

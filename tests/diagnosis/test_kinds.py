@@ -151,7 +151,9 @@ def test_a_turned_tensor_is_named_where_no_motion_shows_the_mass_of_its_body():
     body = '<body name="{}" pos="0 {} 0.2"><inertial pos="0 {} 0.03" mass="2" fullinertia="{}"/><joint name="{}" axis="{}"/>'
     ring = body.format("ring", 0.1, 0.0, ".02 .03 .01 0 0 0", "pan", "0 0 1")
     cup = body.format("cup", 0.3, 0.1, ".012 .009 .005 .001 -.0004 .0007", "tilt", "1 0 0")
-    right = tree_with_sites(reading.read(f"<mujoco><worldbody>{ring}{cup}</body></body></worldbody></mujoco>"))
+    right = tree_with_sites(
+        reading.read(f"<mujoco><worldbody>{ring}{cup}</body></body></worldbody></mujoco>")
+    )
     turn = Rotation.from_euler("xyz", (20.0, 0.0, -50.0), degrees=True).as_matrix()
     tensors = [right.inertia[0], (turn @ np.array(right.inertia[1]) @ turn.T).tolist()]
     found = of_parts(right, *parts(replace(right, inertia=tensors)))

@@ -149,7 +149,9 @@ def test_a_wrong_number_of_the_report_is_found(name, runs):
 def test_rows_that_have_no_worst_state_are_left_out():
     """Those of another engine have quantities of the same names."""
     of = section("engines", GOOD, rows=[{"quantity": "Mbar", "worst_difference": 1.0, "worst_entry": "0"}])
-    said = script(Report([of], ARM, {"command": "c"}, "", plain={"why": "", "zero": None, "mass_alone": False}))
+    said = script(
+        Report([of], ARM, {"command": "c"}, "", plain={"why": "", "zero": None, "mass_alone": False})
+    )
     assert '"states": []' in said and compile(said, "reproduce.py", "exec")
 
 

@@ -87,6 +87,10 @@ class OwnEquations:
         """h, N m, (..., nv)."""
         return self.joints.forces(self.values_of("bias", q, v))
 
+    def coriolis_matrix(self, q: ArrayLike, v: ArrayLike) -> ndarray:
+        """C with C v the velocity part of the bias, (..., nv, nv)."""
+        return self.joints.mass_matrix(self.values_of("coriolis_matrix", q, v))
+
     def gravity_balance(self, q: ArrayLike) -> ndarray:
         """Its gravity, or its bias at rest, N m, (..., nv)."""
         if self.has("gravity"):

@@ -37,6 +37,7 @@ class Quantity(NamedTuple):
 QUANTITIES = {
     "mass_matrix": Quantity(1, ("nv", "nv")),
     "bias": Quantity(2, ("nv",)),
+    "coriolis_matrix": Quantity(2, ("nv", "nv")),
     "gravity": Quantity(1, ("nv",)),
     "acceleration": Quantity(3, ("nv",)),
     "energy": Quantity(2, ()),

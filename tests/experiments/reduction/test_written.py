@@ -166,7 +166,16 @@ def test_a_motion_that_multiplies_errors_is_that_of_the_written_file_too(tmp_pat
     )
     assert told(result) == str(small) and all(check.passed for check in result.checks)
     models = [mujoco.MjModel.from_xml_path(str(file)) for file in (path, small)]
-    for field in ("body_pos", "body_quat", "body_mass", "body_inertia", "jnt_axis", "qpos0", "dof_damping", "site_pos"):
+    for field in (
+        "body_pos",
+        "body_quat",
+        "body_mass",
+        "body_inertia",
+        "jnt_axis",
+        "qpos0",
+        "dof_damping",
+        "site_pos",
+    ):
         one, other = (getattr(model, field) for model in models)
         assert np.allclose(one, other, rtol=1e-15, atol=1e-16), field
     ends = []
