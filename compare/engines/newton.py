@@ -5,8 +5,7 @@ the axes of its joint; of a free body the velocity of its centre of mass and the
 """
 
 from collections.abc import Callable
-from dataclasses import replace
-from functools import cache
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from tmt import Tree
 
 from . import Array, Course
+from .outside import as_it_runs
 from .outside.bodies import Body, Link
 from .outside.file import EngineError, File, OtherJoints
 from .outside.model import ReadModel
@@ -29,6 +29,7 @@ FEATHERSTONE, BY_MUJOCO = "Featherstone", "SolverMuJoCo"  # of its solvers
 UNCONSTRAINED = 0b11111  # MuJoCo's flags that disable all constraints
 OFF = "target_ke", "target_kd", "limit_ke", "limit_kd"  # actuators and limits
 PASSIVE = "damping", "stiffness"
+NUMBERS = "armature", *PASSIVE
 # Featherstone: semi-implicit Euler whose damping is explicit; SolverMuJoCo has the others of MuJoCo Warp too
 METHODS = {FEATHERSTONE: (1, "newton_featherstone")}
 METHODS |= {f"{BY_MUJOCO} {name}": OF_WARP[name] for name in ("implicitfast", "RK4")}
@@ -45,43 +46,38 @@ class Model(ReadModel):
         import newton
         import warp
 
-        warp.config.enable_backward = False
-        self.newton, self.file, self.model = newton, file, read(file, skip_equality_constraints=True)
-        self.state, self.next, self.control = self.model.state(), self.model.state(), self.model.control()
-        self.solver = cache(self.made_solver)
-        for name in OFF:
-            getattr(self.model, f"joint_{name}").zero_()
-        self.order = self.made_order()
-        self.used = {"gravity": np.ravel(self.model.gravity.numpy())}
-        for name in ("armature", *PASSIVE):
-            self.used[name] = self.order.tree_numbers(getattr(self.model, f"joint_{name}").numpy())
-
-    def made_order(self) -> Order:
         from .mujoco.names import joint_places, kind_of
         from .mujoco.source import Source
 
-        file, compiled = self.file, Source(self.file.path, self.file.floating).model
-        if (self.model.joint_coord_count, self.model.joint_dof_count) != (compiled.nq, compiled.nv):
-            raise OtherJoints(self.model.joint_dof_count, compiled.nv)
-        places, starts, reference, nq, nv = joint_places(compiled), {}, np.zeros(compiled.nq), 0, 0
+        warp.config.enable_backward = False
+        compiled, self.newton, self.file = Source(file.path, file.floating).model, newton, file
+        self.model = model = read(file, skip_equality_constraints=True)
+        if (model.joint_coord_count, model.joint_dof_count) != (compiled.nq, compiled.nv):
+            raise OtherJoints(model.joint_dof_count, compiled.nv)
+        places, self.starts, self.reference, nq, nv = joint_places(compiled), {}, np.zeros(compiled.nq), 0, 0
         for name in sorted(
             places, key=lambda n: (compiled.jnt_bodyid[places[n].joint], places[n].kind != "slide")
         ):
             k, place = file.names.index(name), places[name]
-            starts[k] = nq, nv
+            self.starts[k] = nq, nv
             if kind_of(compiled, place.joint) in ("hinge", "slide"):
-                reference[file.coordinates.places.joints[k].q] = compiled.qpos0[place.qpos.start]
+                self.reference[file.coordinates.places.joints[k].q] = compiled.qpos0[place.qpos.start]
             nq, nv = nq + len(place.qpos), nv + len(place.dofs)
-        order = Order(
-            file, starts, XYZW, XYZW, angular_in_world=True, balls_in_parent=True, reference=reference
-        )
-        return self.with_points(order)
+        self.state, self.next, self.control = model.state(), model.state(), model.control()
+        self.solver = cache(self.made_solver)
+        for name in OFF:
+            getattr(model, f"joint_{name}").zero_()
+        self.used = {"gravity": np.ravel(model.gravity.numpy())}
+        self.used |= {name: self.order.tree_numbers(array_of(model, f"joint_{name}")) for name in NUMBERS}
 
-    def with_points(self, order: Order) -> Order:
+    @cached_property
+    def order(self) -> Order:  # type: ignore[override]
         """With the centres of mass of free bodies."""
         children = dict(zip(self.model.joint_qd_start.numpy().tolist(), self.model.joint_child.numpy()))
-        free = {k: children[v - 3] for k, (_, v) in order.starts.items() if self.file.is_free(k)}
-        return replace(order, points={k: self.model.body_com.numpy()[child] for k, child in free.items()})
+        free = {k: children[v - 3] for k, (_, v) in self.starts.items() if self.file.is_free(k)}
+        points = {k: array_of(self.model, "body_com")[child] for k, child in free.items()}
+        return Order(self.file, self.starts, XYZW, XYZW, angular_in_world=True, balls_in_parent=True,
+                     reference=self.reference, points=points)  # fmt: skip
 
     def made_solver(self, method: str) -> Any:
         if method == FEATHERSTONE:
@@ -105,30 +101,27 @@ class Model(ReadModel):
 
     def links(self, at: State) -> list[Link]:
         self.set_state(at)
-        arrays = self.state.body_q, self.model.body_mass, self.model.body_com, self.model.body_inertia
-        numbers = [array.numpy().astype(float) for array in arrays]
-        ends, joint_at = self.model.joint_qd_start.numpy(), {v: k for k, (_, v) in self.order.starts.items()}
+        numbers = [array_of(self.model, f"body_{name}") for name in Body._fields]
+        ends, joint_at = self.model.joint_qd_start.numpy(), {v: k for k, (_, v) in self.starts.items()}
         movers: dict[int, int | None] = {-1: None}  # joints of the Tree, by bodies: of several the last
         links = []
         tree = zip(self.model.joint_child.numpy(), self.model.joint_parent.numpy(), ends, ends[1:])
         for child, parent, *dofs in tree:
             moving = [joint_at[dof] for dof in range(*dofs) if dof in joint_at]
             movers[child] = moving[-1] if moving else movers[parent]
-            x, *body = (array[child] for array in numbers)
-            turn = Rotation.from_quat(x[3:]).as_matrix()
-            links.append(Link(int(child), movers[child], turn, x[:3], Body(*body)))
+            x, body = array_of(self.state, "body_q")[child], Body(*(array[child] for array in numbers))
+            links.append(Link(int(child), movers[child], Rotation.from_quat(x[3:]).as_matrix(), x[:3], body))
         return links
 
     def set_body(self, link: Link, body: Body) -> None:
-        mass, com, inertia = body
-        inverse = np.linalg.inv(inertia) if mass else np.zeros((3, 3))
-        numbers = {"mass": mass, "com": com, "inertia": inertia, "inv_mass": 1.0 / mass if mass else 0.0,
-                   "inv_inertia": inverse}  # fmt: skip
+        mass, _, inertia = body
+        numbers = body._asdict() | {"inv_mass": 1.0 / mass if mass else 0.0}
+        numbers["inv_inertia"] = np.linalg.inv(inertia) if mass else inertia
         for name, value in numbers.items():
             values = getattr(self.model, f"body_{name}").numpy()
             values[link.name] = value
             getattr(self.model, f"body_{name}").assign(values)
-        self.order = self.with_points(self.order)
+        del self.order
 
     def set_state(self, at: State) -> None:
         self.state.joint_q.assign(at.x)
@@ -144,42 +137,44 @@ class Model(ReadModel):
         parts = {name: self.model.state().joint_qd for name in ("gravity_force", "coriolis_force")}
         self.newton.eval_inverse_dynamics_passive(self.model, self.state, **parts)
         h = sum((part.numpy().astype(float) for part in parts.values()), M @ at.c)
-        self.start(at, force, 1.0, None)
-        self.step()
-        return M, h, self.state.joint_qd.numpy().astype(float) - at.u
+        self.start(at, force, acts=False)
+        self.step(FEATHERSTONE, 1.0)
+        return M, h, array_of(self.state, "joint_qd") - at.u
 
-    def start(self, at: State, force: Array, dt: float, method: str | None) -> None:
-        """Prepare steps of dt from a state; method None: of Featherstone's, without damping and springs."""
+    def start(self, at: State, force: Array, acts: bool) -> None:
+        """A state and a force. acts: damping and springs do."""
         for name in PASSIVE:
-            values = self.used[name][self.order.v] * (method is not None)
-            getattr(self.model, f"joint_{name}").assign(values)
-        is_damped = self.used["damping"][self.order.of_free].any()
-        if method == FEATHERSTONE and (is_damped or self.used["stiffness"][self.order.of_ball].any()):
-            raise EngineError("Featherstone has no springs of ball joints and no damping of free joints")
+            getattr(self.model, f"joint_{name}").assign(self.used[name][self.order.v] * acts)
         self.set_state(at)
         self.control.joint_f.assign(force)
-        self.method, self.dt = method or FEATHERSTONE, dt
 
-    def step(self) -> None:
-        self.solver(self.method).step(self.state, self.next, self.control, None, self.dt)
+    def step(self, method: str, dt: float) -> None:
+        self.solver(method).step(self.state, self.next, self.control, None, dt)
         self.state, self.next = self.next, self.state
 
     def step_alone(self, course: Course) -> Callable[[], object]:
+        is_damped = (
+            self.used["damping"][self.order.of_free].any() or self.used["stiffness"][self.order.of_ball].any()
+        )
+        if course.method == FEATHERSTONE and is_damped:
+            raise EngineError("Featherstone has no springs of ball joints and no damping of free joints")
         at = self.order.state(course.q, course.v)
-        self.start(at, at.force(course.tau), course.dt, course.method)
-        if not (self.order.of_ball.any() and course.tau.any()):
-            return self.step
+        self.start(at, at.force(course.tau), acts=True)
+        turns = bool(self.order.of_ball.any() and course.tau.any())
 
-        def turned() -> None:  # the torque turns with a ball
-            self.step()
-            self.control.joint_f.assign(self.order.state(*self.reached()).force(course.tau))
+        def step() -> None:
+            self.step(course.method, course.dt)
+            if turns:  # the torque, with a ball
+                self.control.joint_f.assign(self.order.state(*self.reached()).force(course.tau))
 
-        return turned
+        return step
 
     def reached(self) -> tuple[Array, Array]:
-        return self.order.tree_state(
-            *(a.numpy().astype(float) for a in (self.state.joint_q, self.state.joint_qd))
-        )
+        return self.order.tree_state(array_of(self.state, "joint_q"), array_of(self.state, "joint_qd"))
+
+
+def array_of(of: Any, name: str) -> Array:
+    return np.asarray(getattr(of, name).numpy(), float)
 
 
 def read(file: File, **options: Any) -> Any:
@@ -206,5 +201,8 @@ class Stepper(OfWarp):
         options = {name: int(getattr(model.opt, name)) for name in names}
         solver = newton.solvers.SolverMuJoCo(read(file), njmax=MOST_ROWS, nconmax=MOST_CONTACTS, **options)
         self.model, self.put_model = solver.mj_model, solver.mjw_model
-        self.model.opt.timestep = model.opt.timestep
+        as_it_runs.require_same(self.model, model)
         self.put_model.opt.timestep.fill_(model.opt.timestep)
+
+    def put(self, data: Any) -> Any:
+        return super().put(as_it_runs.copied(self.model, data))

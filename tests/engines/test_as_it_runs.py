@@ -186,15 +186,37 @@ ENGINES = [name for name in ("mjx_float32", "warp", "newton") if not Outside(nam
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ENGINES)
 def test_an_engine_runs_a_file_nearly_as_mujoco_does_once_its_solver_has_converged(engine, file):
-    """MJX leaves 1e-3 of an acceleration where friction holds, in single precision; Newton's integrator is implicitfast."""
+    """MJX leaves 1e-3 of an acceleration where friction holds; all have the step and the integrator of the file."""
     from compare.engines.outside import answers
     from compare.run.reference import compared_with
 
     path = file(1, 2).path
     of = Outside(engine).of(compared_with("model", str(path)).robot.case())
     first, last = (of.ask(answers.run_as_it_is, iterations) for iterations in (None, 100))
-    assert (first.first.field == "efc_force" and last.over < 1e-2 * first.over) or engine == "newton"
+    assert first.first.field == "efc_force" and last.over < 1e-2 * first.over
     same = CHANGES.keys() - {"qvel after"} | {"qacc_smooth"}
     assert max(last.largest[name] for name in same) < BEYOND["float32"]
-    assert last.apart[100] < 1e-4 or engine == "newton"
+    assert last.apart[100] < 1e-4
     assert RECORDS[engine].precision == "float32"
+
+
+def test_a_model_that_an_engine_has_made_has_the_same_joints_and_gets_the_state_of_mujocos(file):
+    text = RUNNING.format(100, 50)
+    m, other = (
+        mujoco.MjModel.from_xml_string(text.replace('size="0.1"', size))
+        for size in ('size="0.1"', 'size="0.2"')
+    )
+    d = mujoco.MjData(m)
+    mujoco.mj_resetDataKeyframe(m, d, 0)
+    mujoco.mj_step(m, d)
+    as_it_runs.require_same(other, m)
+    data = as_it_runs.copied(other, d)
+    for name in ("qpos", "qvel", "ctrl", "qacc_warmstart"):
+        assert np.array_equal(getattr(data, name), getattr(d, name)) and getattr(d, name).any()
+    for old, new in (
+        ('<joint name="knee"', '<joint type="slide" name="knee"'),
+        ('<position joint="hip" kp="20" kv="1"/>', ""),
+    ):
+        changed_text = text.replace(old, new).replace(' ctrl="0.4"', "" if not new else ' ctrl="0.4"')
+        with pytest.raises(ValueError, match=r"jnt_type|nu is 0"):
+            as_it_runs.require_same(mujoco.MjModel.from_xml_string(changed_text), m)

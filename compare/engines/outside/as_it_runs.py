@@ -74,6 +74,27 @@ class Stepper(ABC):
         """Data of the engine's in MuJoCo's."""
 
 
+def require_same(model: mujoco.MjModel, other: mujoco.MjModel) -> None:
+    """ValueError where a model that an engine has made of the file has other joints, or other numbers of something."""
+    for name in ("nq", "nv", "nu", "na", "nbody", "ngeom"):
+        counts = getattr(model, name), getattr(other, name)
+        if counts[0] != counts[1]:
+            raise ValueError(f"{name} is {counts[0]} in its model, {counts[1]} in MuJoCo's")
+    for name in ("jnt_type", "qpos0"):
+        if not np.allclose(getattr(model, name), getattr(other, name), atol=1e-6):
+            raise ValueError(f"{name} is not that of MuJoCo's model")
+
+
+def copied(model: mujoco.MjModel, data: mujoco.MjData) -> mujoco.MjData:
+    """Data of such a model with the state, controls and warm start of MuJoCo's."""
+    values = mujoco.MjData(model)
+    for name in ("qpos", "qvel", "act", "ctrl"):
+        getattr(values, name)[:] = getattr(data, name)
+    mujoco.mj_forward(model, values)
+    values.qacc_warmstart[:] = data.qacc_warmstart
+    return values
+
+
 Fields = dict[str, Array]  # of a step
 Kind = Callable[[File, Any], Stepper]
 
