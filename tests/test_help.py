@@ -76,7 +76,7 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
     if words[:1] == ["fleet"]:
         made = fleet_parser()
         options = made.parse_intermixed_args(words[1:])
-        assert options.help or (options.paths and experiments_of(made, options.only))
+        assert options.help or (options.paths and experiments_of(made, options))
     elif words[:1] == ["equations"] and "--help" not in words:
         assert command_parser("", "", "export", OF_EQUATIONS).parse_args(words[1:]).out
     elif "--help" in words or not words:

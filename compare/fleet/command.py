@@ -35,6 +35,7 @@ def fleet_reference(text: str) -> str:
     return stated_reference(text)
 
 
+LOADED = "compare.fleet.loaded"
 FLEET_OPTIONS = {
     "--out": Option(metavar="DIR", default=f"reports/{FLEET}"),
     "--full": Option(None),
@@ -52,12 +53,13 @@ def fleet_parser() -> cli.Parser:
     return made
 
 
-def experiments_of(made: cli.Parser, only: str | None) -> tuple[str, ...]:
-    """The experiments of --only, in their order; None: all that measure no times."""
+def experiments_of(made: cli.Parser, options: argparse.Namespace) -> tuple[str, ...]:
+    """Those of --only, else all that measure no times; with a reference, and without --full, those that compare two models."""
     able = {name: name for name in EXPERIMENTS if name not in TIMED}
-    if only is None:
-        return tuple(able)
-    names = only.replace(" ", "").split(",")
+    if options.only is None:
+        is_short = options.reference and options.reference != "model" and not options.full
+        return tuple(name for name in able if not (is_short and EXPERIMENTS[name].runs_file))
+    names = options.only.replace(" ", "").split(",")
     for name in names:
         if name in TIMED:
             made.error(f"--only: {name} measures times, which a fleet does not: {PROGRAM} {name}")
@@ -80,7 +82,7 @@ def fleet_status(arguments: Sequence[str]) -> int:
         made.error(f"no PATH given; expected a file, a folder, a pattern or @LIST: {PROGRAM} {FLEET} models")
     if options.workers and options.dask:
         made.error("--workers cannot be combined with --dask")
-    names = experiments_of(made, options.only)
+    names = experiments_of(made, options)
     return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
 
 
@@ -99,7 +101,7 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     solution = solution_of(options.reference)
     path = os.path.abspath(solution.path) if solution else ""
     file_options = FleetOptions(names, not options.full, options.reference, path)
-    make = partial(Cluster, options.dask) if options.dask else partial(Pool, options.workers or cores())
+    make = partial(Cluster, options.dask) if options.dask else partial(Pool, options.workers or cores(), loaded=[LOADED])
     with locked(out), closing(make(options.limit)) as executor:
         run = Run(models, file_options, executor, out, solution)
         terminal.how_far = run.progress

@@ -10,7 +10,7 @@ import shutil
 import tempfile
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from functools import cache
@@ -63,11 +63,15 @@ def memory_of_machine() -> int:
 class Pool:
     """Processes of this machine.
 
-    limit: s for a call; memory: bytes, by default its share; folder: for temporary files.
+    limit: s for a call; memory: bytes, by default its share; folder: for temporary files; loaded: modules that
+    each process has from its beginning.
     """
 
-    def __init__(self, workers: int, limit: float, memory: float | None = None, folder: str | None = None):
-        self.workers, self.limit, self.folder = workers, limit, folder or own_folder()
+    def __init__(
+        self, workers: int, limit: float, memory: float | None = None, folder: str | None = None,
+        loaded: Sequence[str] = (),
+    ):  # fmt: skip
+        self.workers, self.limit, self.folder, self.loaded = workers, limit, folder or own_folder(), loaded
         self.memory = int(SHARE * (memory or memory_of_machine() / workers))
         os.environ |= ENVIRONMENT
         of_process = {"is_silent": True, "memory": self.memory, "folder": self.folder}
@@ -75,7 +79,7 @@ class Pool:
 
     def submit(self, function: Callable[..., T], *arguments: Any) -> "Future[Outcome[T]]":
         if hasattr(os, "fork"):
-            multiprocessing.set_forkserver_preload([__name__, function.__module__])
+            multiprocessing.set_forkserver_preload([__name__, function.__module__, *self.loaded])
         return self.processes.submit(alone, function, arguments, self.folder, self.memory)
 
     def outcome(self, future: "Future[Outcome[T]]") -> Outcome[T]:

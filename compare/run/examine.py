@@ -74,6 +74,7 @@ class Run:
     told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
     unsaid: list[Section] = field(default_factory=list)  # whose lines wait
     mended: int = 0  # states at which M and h agree without the causes; 0: that is not known
+    few: bool = False  # figures of a quick run where checks fail too: those of the first screen alone
     drawings: list[tuple[Section, Future[list[Figure]]]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -189,7 +190,8 @@ class Run:
 
     def draw(self, section: Section) -> None:
         if section.name not in self.crashed:
-            few = self.setup.is_quick and not self.setup.alone and not any(failures([section]))
+            is_short = self.few or not any(failures([section]))
+            few = self.setup.is_quick and not self.setup.alone and is_short
             others = results_needed(section.name, self.order, self.sections)
             arguments = section.name, section.result, self.setup.robot, self.folder / "figures", others, few
             with self.clock.of(END):

@@ -40,7 +40,7 @@ def test_a_fleet_says_which_file_differs_and_why_and_has_a_tidy_table(folder, ca
     assert err == "" and "out/index.html (" in lines[-1]
     assert " of 3 files" not in shown and "Left out: 1 file" in shown  # progress is for terminals
     assert f"m/x/{NAME}: " in said["self-consistent"] and " %" in said["self-consistent"]
-    assert "m/heavy.xml: mass of upper arm: stated 1.9 kg, compiled 9 kg" in said["differ"]
+    assert "m/heavy.xml: mass of upper arm: 9 kg in heavy.xml, 1.9 kg" in said["differ"]
     assert "\x1b" not in shown and "\r" not in shown  # nothing moves in a pipe
     with (folder / "out" / "fleet.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -103,12 +103,29 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
         raise Refused("seen")
 
     for name in ("Pool", "Cluster"):
-        start = lambda self, *given: seen.extend((type(self).__name__, *given))  # noqa: E731
+        start = lambda self, *given, **more: seen.extend((type(self).__name__, *given))  # noqa: E731
         made = {"__init__": start, "close": lambda self: None}
         monkeypatch.setattr(f"compare.fleet.executors.{name}", type(name, (), made))
     monkeypatch.setattr("compare.fleet.run.Run", run)
     assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words.split()]) == 2
     assert tuple(seen) == asked and "seen" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words, has_rest", [
+    ("", True), ("--reference model", True), ("--reference arm", False), ("--reference arm --full", True),
+])  # fmt: skip
+def test_with_a_reference_what_asks_about_one_file_is_for_full_runs(words, has_rest, monkeypatch, folder):
+    """Without one there is nothing else; what compares two models is always there, and what measures times never."""
+    seen = []
+
+    def run(models, given, *_):
+        seen.extend(given.names)
+        raise Refused("seen")
+
+    monkeypatch.setattr("compare.fleet.run.Run", run)
+    assert main(["fleet", "m", "--out", "asked", *words.split()]) == 2
+    assert {"parameters", "mass", "trajectory", "diagnosis"} <= {*seen} and not {"speed", "derivatives"} & {*seen}
+    assert [name in seen for name in ("stability", "reduction")] == [has_rest] * 2
 
 
 # ended in the middle: a line, nothing left behind, and the same command goes on from there

@@ -176,7 +176,7 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
     files |= {"slide.xml": right.replace("axis", "type='slide' axis"), "right.xml": right}
     found = fleet(files, ["parameters"], reference="solution.xml")
     named = {
-        "heavy.xml": (DIFFER, "mass of b: stated 1 kg, compiled 2 kg"),
+        "heavy.xml": (DIFFER, "mass of b: 2 kg in heavy.xml, 1 kg in solution.xml"),
         "renamed.xml": (AGREE, "joint 0 as j"), "slide.xml": (DIFFER, "solution.xml"), "right.xml": (AGREE, ""),
     }  # fmt: skip
     assert found.verdicts == {name: verdict for name, (verdict, _) in named.items()}
