@@ -60,12 +60,15 @@ class Reference(NamedTuple):
         return block("run", "subject", kind=self.kind, file=file, other=other)
 
     @property
+    def matched(self) -> str:
+        return f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
+
+    @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
-        matched = f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
         first = f"reference: {self.kind}; {self.file} compared with {other}"
-        return tuple(in_one_line(line) for line in (first, matched, *self.otherwise, *self.remarks) if line)
+        return tuple(in_one_line(line) for line in (first, self.matched, *self.otherwise, *self.remarks) if line)
 
 
 class Compared(NamedTuple):
