@@ -24,13 +24,13 @@ SOLUTIONS = ".xml", ".mjcf", ".urdf"
 
 
 def stated_reference(text: str) -> str:
-    """What a model is compared with; a text with a colon is read later."""
+    """What a model is compared with; a text with a colon is read later. FILE.py is all of the file, as FILE.py:."""
+    if text.endswith(".py"):
+        return f"{text}:"
     if text in ("arm", "model") or ":" in text or text.lower().endswith(SOLUTIONS):
         return text
     choices = "arm, model, FILE.xml or .urdf, FILE.py:OBJECT or MODULE:OBJECT"
     hint = expected(text, ("arm", "model"), choices)
-    if text.endswith(".py"):
-        hint = f"expected {text}: (all of it), or FILE.py:OBJECT"
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 
 
@@ -75,7 +75,7 @@ class Options:
 class EquationOptions(Options):
     """Of experiments that compare a user's own equations."""
 
-    joints: str | None = option(metavar="LIST", example=f"{ROBOT} --reference my_equations.py:")
+    joints: str | None = option(metavar="LIST", example=f"{ROBOT} --reference my_equations.py")
 
 
 @dataclass(frozen=True, kw_only=True)
