@@ -7,16 +7,21 @@ from dataclasses import replace
 
 import pandas as pd
 import pytest
+from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure as Drawing
+from models import PATHS
 from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
 from compare.core.check import About
+from compare.core.finding import Finding
+from compare.core.text import environment
 from compare.report import images, provenance
 from compare.report.document import Document
 from compare.report.files import write
 from compare.report.verdict import OVERVIEW, Report, verdict
 from compare.robots.arm import ARM
+from compare.run.reference import compared_with
 
 ROW = '<span class="mark {}" aria-hidden="true">✓</span></td>\n<td><a href="#{}">'
 CAUSE = Cause(rank=2, place="mass of forearm", stated=1.5, explains=1.6, text="forearm: 1.6 kg")
@@ -189,3 +194,33 @@ def test_the_commit_is_said_and_whether_the_program_was_changed_since(tmp_path, 
     (tmp_path / "tmt" / "b").touch()
     assert provenance.commit() != git("rev-parse", "HEAD")
     assert provenance.commit().startswith(git("rev-parse", "HEAD"))
+
+
+def test_a_tolerance_is_in_words_and_its_formulas_are_on_a_page_of_their_own(folder):
+    of = section("mass", GOOD)
+    of.tolerance = "Rounding of <each>\nentry.\n\n64 eps x L & more,\nof all."
+    document = Document(report_of(folder, [of]))
+    text, page = document.text(), document.tolerances()
+    assert "Rounding of &lt;each&gt; entry. [Formulas](tolerances.html#mass)." in text and "64 eps x L" not in text
+    assert '<section id="mass">' in page and "64 eps x L &amp; more, of all." in page and "Rounding" not in page
+
+
+@pytest.mark.parametrize("name, is_said", [("mass", True), ("stability", False)])
+def test_what_a_comparison_switches_off_is_said_where_something_is_compared(name, is_said, folder):
+    robot = compared_with("model", str(PATHS["quadruped"])).robot
+    report = report_of(folder, [section(name, GOOD)], robot=robot)._replace(first_lines=["reference: model"])
+    text = Document(report).text()
+    for words in ("Switched off in MuJoCo", "are compared with MuJoCo's", "reference: model", "tolerance that was fixed"):
+        assert (words in text) == is_said
+    assert (text.startswith("# quadruped.xml: stability")) != is_said
+
+
+def test_the_answer_to_one_question_has_its_table(folder, monkeypatch):
+    template = "{% macro said() %}\nUse {{ 2 }}.\n| way | < what |\n| a | {{ '<b>' }} |\nAnd more.\n{% endmacro %}"
+    loaders = [DictLoader({"odd.md.jinja": template}), environment().loader]
+    monkeypatch.setattr(environment(), "loader", ChoiceLoader(loaders))
+    sections = [section("stability", GOOD), section("mass", GOOD)]
+    sections[0].result.top = [Finding("odd", "said")]
+    alone, both = (Document(report_of(folder, few)).text() for few in (sections[:1], sections))
+    assert "| way | what |" in alone and "| a | &lt;b&gt; |" in alone and alone.index("Use 2.") < alone.index("And more.")
+    assert "| way |" not in both and "Use 2. And more." in both

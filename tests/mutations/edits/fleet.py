@@ -1,9 +1,10 @@
 """Wrong verdicts of a fleet, and wrong decisions what to compute."""
 
 EDITS = (
-    ("fleet.table", "judge", "row.verdict = DIFFER", "row.verdict = AGREE", "a file that differs agrees"),
-    ("fleet.table", "judge", "row.verdict = BROKE", "row.verdict = AGREE", "what broke off agrees"),
-    ("fleet.table", "judge", "if unfinished:\n _1", "pass", "what differs hides what broke off"),
+    ("fleet.table", "judge", "kind in VERDICT_OF", "False", "whatever fails, a file agrees"),
+    ("fleet.table", "judge", "min(judged, *_1)", "max(judged, *_1)", "of several verdicts the mildest counts"),
+    ("fleet.table", "judge", "said[1:2] if failed.broke else []", "[]", "what differs hides what broke off"),
+    ("fleet.command", "experiments_of", "EXPERIMENTS[name].runs_file", "False", "a reference spares no question"),
     ("fleet.run", "Run.start", "_1, own_hash, *others", "_1, own_hash", "a file with other parts is a copy"),
     ("process.workers", "Workers.start", "tries <= self.retries", "False", "no killed process is tried again"),
     ("process.workers", "Workers.start", "not self.pool.active", "False", "an idle process that ends is not replaced"),
@@ -18,14 +19,12 @@ EDITS = (
     ("export.command", "identifier", "_1 and not is_word(name)", "_1", "a function is named like a word of a language"),
     ("fleet.table", "FileRow.order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),
     ("fleet.table", "judge", 'reference.kind == "model"', "False", "what was compared with itself agrees"),
-    ("fleet.table", "judge", "NOT_JUDGED if failed.not_judged else verdict", "verdict", "what was not judged agrees"),
     ("fleet.table", "row_of_data", "data['verdict'] not in VERDICTS", "False", "what lies in a folder is a row"),
     ("fleet.table", "row_of_data", "_1 if are_right else None", "_1", "any value is that of a row"),
-    ("fleet.table", "judge", "UNCONFIRMED if failed.unconfirmed else _1", "_1", "what no run confirms agrees"),
     ("fleet.models", "Model.contents", "part.read_bytes()", "name.encode()", "changed files are forgotten"),
     ("fleet.run", "Run.start", "self.solution.contents if self.solution else ()", "()", "another solution is the same"),
     ("fleet.cache", "saved", "files == hashes(place)", "True", "a report that is gone or edited passes for saved"),
-    ("fleet.table", "FileRow.is_bad", "self.verdict in BAD_VERDICTS", "False", "always good"),
+    ("fleet.table", "FileRow.is_bad", "self.verdict in VERDICT_OF.values()", "False", "always good"),
     ("fleet.cache", "program", "path.suffix in _1", "False", "any program is the same"),
     ("fleet.run", "Run.receive", "verdict=BROKE", "verdict='agree'", "a crash agrees"),
 )  # fmt: skip
