@@ -60,9 +60,8 @@ def option(kind: Callable[[str], Any] | None = not_empty, metavar: str | None = 
 
 def options_in(kind: type) -> dict[str, Option]:
     """The options of a dataclass by their words: --control-period of control_period."""
-    return {
-        f"--{field.name.replace('_', '-')}": field.metadata["option"] for field in dataclasses.fields(kind)
-    }
+    made = [field for field in dataclasses.fields(kind) if "option" in field.metadata]
+    return {f"--{field.name.replace('_', '-')}": field.metadata["option"] for field in made}
 
 
 def name_of(word: str) -> str:

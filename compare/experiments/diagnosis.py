@@ -17,7 +17,6 @@ from ..core.rows import Row, column
 from ..core.text import block
 from ..diagnosis import STATES_ASKED, Stated, Values
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.forces import LeftOver
 from ..diagnosis.model import ROUNDED, Equations, packed
 from ..engines import Dynamics
 from ..engines.mujoco.reading import tree_with_sites
@@ -25,7 +24,6 @@ from ..engines.own import OwnDynamics
 from ..judge.agree import share_of
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
-from ..robots.states import Sample
 from . import Drawing
 from .setup import Setup
 
@@ -74,9 +72,7 @@ class Found(NamedTuple):
     engine: str
     states: int
     why: Why
-    ratio: float | None = (
-        None  # of a difference of Mbar or h to its tolerance, the largest; None: they are not given
-    )
+    ratio: float | None = None  # of a difference of Mbar or h to its tolerance; None: they are not given
     conditions: Sequence[Condition] | None = ()  # on a user's own Mbar and h; None: they take too long
     curve: Curve | None = None  # of a user's own Mbar and h, where nothing explains their difference
 
@@ -88,19 +84,13 @@ class Found(NamedTuple):
     @property
     def said(self) -> list[Cause]:
         """One of Mbar and h, one of accelerations: the likeliest, and in its text others that explain the same."""
-        return [one_of(causes) for causes in (self.why.diagnosis.causes, self.why.forces) if causes]
+        several = [causes for causes in (self.why.diagnosis.causes, self.why.forces) if causes]
+        return [replace(found[0], text=block("causes", "causes", list=found, most=MOST_SAID)) for found in several]
 
     @property
     def share(self) -> float:
         """Of the largest difference of Mbar or h in the scale of its entry."""
         return (self.ratio or 0.0) * FACTOR * EPS
-
-
-def one_of(causes: Sequence[Cause]) -> Cause:
-    """The first of some causes that no state can distinguish, with the others in its text."""
-    if len(causes) == 1:
-        return causes[0]
-    return replace(causes[0], text=block("causes", "causes", list=causes, most=MOST_SAID))
 
 
 @lru_cache(maxsize=2)
@@ -142,14 +132,12 @@ def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Val
     ratios = np.nan_to_num(ratios, posinf=0.0)
     state, k = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
     equations, qd = Equations(tree, values.q, values.qd), np.tile(values.qd[state], (POINTS, 1))
-    coordinates, curves = equations.coordinates, []
+    coordinates, entry, curves = equations.coordinates, equations.entries[k].named(equations.speeds), []
     for name, unit, direction in zip(coordinates.speeds, coordinates.units, np.eye(equations.nv)):
         moved = np.linspace(-1.0, 1.0, POINTS) * (1.0 if unit == "m" else np.pi)
         q = coordinates.move(np.tile(values.q[state], (POINTS, 1)), moved[:, None] * direction)
         yours = packed(dynamics.mass_matrix(q), dynamics.bias(q, qd))[:, k]
-        of_model = Equations(tree, q, qd).right[:, k]
-        entry = equations.entries[k].named(equations.speeds)
-        curves.append(Curve(entry, name, unit, moved, yours, of_model))
+        curves.append(Curve(entry, name, unit, moved, yours, Equations(tree, q, qd).right[:, k]))
     return max(curves, key=lambda curve: np.nan_to_num(np.ptp(curve.yours - curve.right)))
 
 
@@ -166,13 +154,6 @@ def conditions_of(dynamics: Dynamics, values: Values) -> list[Condition] | None:
     return [condition for condition in every if np.isfinite(condition.tolerance)]
 
 
-def is_solved(dynamics: OwnDynamics, tree: tmt.Tree, sample: Sample) -> bool:
-    """Whether a user's accelerations are those of the own Mbar and h at all states of a sample."""
-    q, qd, tau = sample.q, sample.qd, sample.tau
-    values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
-    return LeftOver(tree, values, tau, dynamics.acceleration(q, qd, tau)).ratio <= 1.0
-
-
 def rows(setup: Setup) -> DiagnosisResult:
     """A row for each explanation; a check of each condition, of Mbar and h, and of accelerations."""
     found = diagnosed(setup)
@@ -181,11 +162,7 @@ def rows(setup: Setup) -> DiagnosisResult:
         check(result, found, condition)
     if found.ratio is not None:
         is_known = found.why.diagnosis.differs or np.isfinite(found.ratio)
-        finding = (
-            result.finding("of_equations", found=found)
-            if is_known
-            else result.finding("no_numbers", found=found)
-        )
+        finding = result.finding("of_equations" if is_known else "no_numbers", found=found)
         check(result, found, Condition(OF_EQUATIONS, found.ratio, 1.0, "", finding))
     finding = result.finding("of_forces" if np.isfinite(found.why.force_ratio) else "no_numbers", found=found)
     name = ACCELERATIONS_ALONE if found.ratio is None else OF_ACCELERATIONS
@@ -211,9 +188,8 @@ def check(result: Result, found: Found, condition: Condition) -> None:
 
 
 def headline(result: DiagnosisResult) -> Finding | None:
-    if not result.rows:
-        return None
-    return result.finding("headline", place=result.rows[0].place, more=len(result.rows) - 1)
+    more = len(result.rows) - 1
+    return result.finding("headline", place=result.rows[0].place, more=more) if result.rows else None
 
 
 def figures(result: DiagnosisResult, robot: Robot) -> Iterator[Drawing]:

@@ -15,6 +15,8 @@ from ..core.options import ROBOT, expected, name_of, number, option, options_in,
 from ..core.text import block
 
 if TYPE_CHECKING:
+    from numpy import ndarray
+
     from ..engines.mujoco.reading import Reading
 
 WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
@@ -119,12 +121,11 @@ class WriteOptions(Options):
 
 @dataclass(frozen=True, kw_only=True)
 class MotionOptions(Options):
-    """Of what a robot does: posture: a name, or numbers with commas; controls: by names of actuators, and times."""
+    """Of what a robot does: posture: a name, or numbers with commas; recorded: by names of actuators, and times."""
 
     posture: str | None = option(metavar="NAME|NUMBERS", of_file=True)
-    controls: Mapping[str, Any] | str | None = option(
-        metavar="CSV", of_file=True, example=f"{ROBOT} --controls recorded.csv"
-    )
+    controls: str | None = option(metavar="CSV", of_file=True, example=f"{ROBOT} --controls recorded.csv")
+    recorded: "Mapping[str, ndarray] | None" = None  # times and controls, of the file of --controls
 
     def validated(self, reading: "Reading | None", name: str, dt: float | None = None) -> Self:
         """As Options.validated, with the controls that are recorded. dt: s, the step that is asked for."""
@@ -139,12 +140,12 @@ class MotionOptions(Options):
                 posture_of(self.posture, reading)
             except ValueError as error:
                 raise Refused(f"{' '.join(self.given)}: {error}") from None
-        if not isinstance(self.controls, str):
+        if not self.controls:
             return options
         if self.get("scenes"):
             raise Refused("--controls and --scenes both say what the robot does")
         names = reading.drive.names if reading.drive else ()
-        return replace(options, controls=read_controls(self.controls, names, dt or reading.dt))
+        return replace(options, recorded=read_controls(self.controls, names, dt or reading.dt))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -107,7 +107,7 @@ def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:
     motions = [Motion(reading.model, roll.name, roll.state, "") for roll in rolls]
     if not rolls:
         posture = posture_of(asked.posture, reading) if asked.posture else postures_of(reading)[0]
-        motion, controls = motion_of(reading, posture, asked.controls), None
+        motion, controls = motion_of(reading, posture, asked.recorded), None
         steps = max(1, round((motion.times[-1] if len(motion.times) else DURATION) / reading.dt))
         if len(motion.times):
             controls = np.vstack([np.array(part) for _, part in motion.parts(stepper, steps, 0.0, 0.0)])

@@ -38,7 +38,7 @@ def begin(setup: Setup, reading: Reading) -> Work:
     dt, own = asked.dt or reading.dt, asked.integrator or reading.integrator
     names = [own, DEFAULT] if setup.is_quick else [own, *INTEGRATORS]
     question = Question(
-        dt, own, list(dict.fromkeys(names)), asked.push, asked.error, asked.controls, asked.control_period,
+        dt, own, list(dict.fromkeys(names)), asked.push, asked.error, asked.recorded, asked.control_period,
         asked.delay, asked.kp, asked.kv, drawn=setup.alone and not setup.is_quick, helped=True,
     )  # fmt: skip
     others = question._replace(integrators=[own], drawn=False, helped=False)

@@ -101,11 +101,11 @@ def run(path, joint, steps, controls=None, key=0, names=None):
 def two_arms(tmp_path_factory):
     path = tmp_path_factory.mktemp("smaller") / "smaller.xml"
     controls = waves("left upper", "left lower")
-    return answered(TWO_ARMS, controls=controls, points="left tip,right hand", write=str(path)), path
+    return answered(TWO_ARMS, recorded=controls, points="left tip,right hand", write=str(path)), path
 
 
 def test_what_a_motion_does_not_use_goes_bit_for_bit():
-    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    arms = scene(TWO_ARMS, recorded=waves("left upper"))
     rows, small = take_out(arms), arms.left
     assert {row.kind: row.taken_out for row in rows if row.same_bits} == {
         "drawing": 3, "sensors": 1, "geoms that never touch": 6, "equalities without force": 1, "actuators without force": 3,
@@ -122,7 +122,7 @@ def test_a_kind_without_which_the_motion_differs_stays(monkeypatch):
         return 1
 
     monkeypatch.setattr(search, "FREE", {"mass": heavier} | FREE)
-    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    arms = scene(TWO_ARMS, recorded=waves("left upper"))
     assert [row.kind for row in take_out(arms) if not row.same_bits] == ["mass"]
     assert arms.left.model.body("left hand").mass == pytest.approx(0.3, rel=1e-12)
 
@@ -254,7 +254,7 @@ def test_the_equations_of_the_smaller_model_are_those_of_tmts_lock(two_arms):
 
 
 def test_a_file_beyond_the_error_fails_and_a_model_that_moves_otherwise():
-    arms = scene(TWO_ARMS, controls=waves("left upper", "left lower"))
+    arms = scene(TWO_ARMS, recorded=waves("left upper", "left lower"))
     heavier = Smaller(arms.whole.spec.copy())
     heavier.spec.body("left hand").geoms[0].mass *= 1.5
     heavier = Smaller(heavier.spec)
@@ -268,7 +268,7 @@ def test_a_file_beyond_the_error_fails_and_a_model_that_moves_otherwise():
 
 def test_the_joints_that_a_tendon_ties_are_locked_together():
     """A hand whose thumb is still; the tendon and its servo go with it. The index moves far, at no cost to others."""
-    hand = scene(HAND, controls=waves("index"))
+    hand = scene(HAND, recorded=waves("index"))
     locks = lockable(hand, 1e-2)
     assert {"thumb", "thumb tip"} <= set(locks.names) and "index" not in locks.names
     assert [len(names) for names, *_ in locks.models] == sorted({len(names) for names, *_ in locks.models})
@@ -289,7 +289,7 @@ def test_joints_are_locked_from_the_least_error_on_and_one_that_costs_too_much_i
     monkeypatch.setattr(search, "error_of", error_of)
     monkeypatch.setattr(search, "tied_joints", lambda model: [[name] for name in reversed(costs)])
     monkeypatch.setattr(search, "DOES_TURN", 10.0)
-    hand = scene(HAND, controls=waves("index"))
+    hand = scene(HAND, recorded=waves("index"))
     assert lockable(hand, 4e-4).names == ["wrist", "thumb", "thumb tip"]
     locks = lockable(hand, 3.99e-4)
     assert locks.names == ["wrist", "thumb"]
@@ -391,7 +391,7 @@ def test_each_fusing_of_bodies_rounds_all_that_are_in_it():
 
 def test_a_run_that_fails_is_infinitely_far():
     """From the time on where it fails."""
-    arms = scene(TWO_ARMS, controls=waves("left upper"))
+    arms = scene(TWO_ARMS, recorded=waves("left upper"))
     assert arms.error(arms.whole) == 0.0
     arms.paths[0].q[-1, 3] = np.nan
     assert arms.error(arms.whole) == np.inf
@@ -399,7 +399,7 @@ def test_a_run_that_fails_is_infinitely_far():
 
 def test_recorded_controls_are_held_between_their_times():
     slow = TWO_ARMS.replace('integrator="implicitfast"', 'timestep="0.05"')
-    arms = scene(slow, controls={"time": np.array([0.0, 0.1, 0.3]), "left upper": np.array([1.0, 2.0, 3.0])})
+    arms = scene(slow, recorded={"time": np.array([0.0, 0.1, 0.3]), "left upper": np.array([1.0, 2.0, 3.0])})
     (motion,) = arms.rolls
     assert (
         motion.controls[:, 0].tolist() == [1.0, 1.0, 2.0, 2.0, 2.0, 2.0] and not motion.controls[:, 1:].any()

@@ -162,5 +162,5 @@ def test_the_longest_step_within_an_error_is_told(result):
 
 def test_recorded_controls_are_judged():
     times = np.linspace(0.0, 0.5, 26)
-    result = found_of(controls={"time": times, "actuator 0": np.sin(9.0 * times)})
+    result = found_of(recorded={"time": times, "actuator 0": np.sin(9.0 * times)})
     assert result.tables["step_limits"][0].controls == "record" and result.checks[0].passed
