@@ -55,8 +55,8 @@ class Document:
         return joined(template.render(
             report=report, title=self.title, lines=sum(reversed(lines) if report.answers_first else lines, list[str]()),
             explained=self.explained(), pictures=self.pictures(), introduction=" ".join(introduction.split()),
-            answers=self.answers, outcome=outcome, standing=standing, headline=headline, most=MOST_ROWS, titles=TITLES,
-            **OF_TABLES,
+            answers=self.answers, outcome=outcome, standing=standing, headline=headline, most=MOST_ROWS,
+            most_causes=FIRST_CAUSES, titles=TITLES, **OF_TABLES,
         ))  # fmt: skip
 
     def page(self, folder: Path) -> str:

@@ -89,6 +89,14 @@ def test_a_failing_report_shows_stated_beside_found_and_first_the_picture_that_s
 BROKEN = "runs to its end", None, 0.0, "equal", False, About.PROGRAM
 
 
+@pytest.mark.parametrize("count, is_there", [(4, False), (5, True)])
+def test_causes_are_said_once_and_have_a_section_where_the_first_screen_has_not_all(count, is_there, folder):
+    causes = [replace(CAUSE, text=f"cause {k} of all") for k in range(count)]
+    text = Document(report_of(folder, [section("mass", BAD)], causes)).text()
+    assert [text.count(cause.text) for cause in causes] == [1 + is_there] * 4 + [1] * is_there
+    assert ('<section id="causes">' in text) is is_there and ("(#causes)" in text) is is_there
+
+
 def test_what_broke_off_or_was_not_judged_is_on_the_first_screen_and_in_its_section_and_no_other_is(folder):
     open_section = section("gravity", GOOD)
     open_section.result.not_judged("held", "torque", "nothing moves")

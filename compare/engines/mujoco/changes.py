@@ -72,7 +72,7 @@ def with_slower_contacts(model: mujoco.MjModel, factor: float) -> mujoco.MjModel
 
 
 def with_iterations(model: mujoco.MjModel, count: int) -> mujoco.MjModel | None:
-    """With at least so many iterations of the solver, and of each line search; None: it has as many."""
+    """With at least `count` iterations of the solver, and of each line search; None: it has as many."""
     option = model.opt
     if min(option.iterations, option.ls_iterations) >= count:
         return None
@@ -82,7 +82,7 @@ def with_iterations(model: mujoco.MjModel, count: int) -> mujoco.MjModel | None:
 
 
 def with_noslip(model: mujoco.MjModel, count: int) -> mujoco.MjModel:
-    """With so many iterations of the solver that takes slip away."""
+    """With `count` iterations of the solver that takes slip away."""
     return changed(model, noslip_iterations=count)
 
 

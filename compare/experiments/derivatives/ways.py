@@ -68,7 +68,7 @@ def worst_block(difference: Array, exact: Array, nv: int, least: Array | float =
     """The largest difference over the largest entry of its block, and that block, as dq/du.
 
     Of [A B], (..., n, n + k), with nv movements and speeds, then activations. Blocks whose entries are no larger
-    than `least`, of each entry, are zero but for rounding, and left out. inf: a difference is not a number.
+    than `least`, of each entry, are zero except for rounding, and left out. inf: a difference is not a number.
     """
     least, worst, n = np.broadcast_to(least, exact.shape), (0.0, ""), exact.shape[-2]
     to = {"dq": slice(nv), "dv": slice(nv, 2 * nv), "da": slice(2 * nv, n)}

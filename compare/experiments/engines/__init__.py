@@ -32,7 +32,7 @@ SLOW = 20.0  # s of the processor, of a run that is slow
 TABLES = "answer", "read", "runs"
 # of which nothing more is said; their names are kinds in the template
 NOT_ASKED = Unread, OtherJoints, OtherNames, TooLong
-# s, of the first calls of an engine that compiles: so many, and per speed and pair of speeds; measured on two cores
+# s, of the first calls of an engine that compiles: in all, per speed and pair of speeds; measured on two cores
 COMPILATION = 15.0, 1.0, 0.05
 
 

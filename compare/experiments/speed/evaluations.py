@@ -16,7 +16,7 @@ from ..setup import Setup
 
 FEW, MANY = 1000, 100_000  # states of one call
 MOST_OF_MANY = 3  # nv up to which MANY states fit into memory
-FIRST_CALLS, MOST_CALLS, TIMED = 4, 100_000, 1e-3  # repetitions in a timed call of about so many s
+FIRST_CALLS, MOST_CALLS, TIMED = 4, 100_000, 1e-3  # repetitions in a timed call; s, of about that call
 FORWARD, ONE_BY_ONE, SIDE_BY_SIDE = "forward_dynamics", "compiled", "compiled, side by side"
 
 
