@@ -49,6 +49,10 @@ class Model(OfCompiled):
         M, h, a = map(np.asarray, functions()["values"](self.first.replace(**none), self.data, *state))
         return M, h, a
 
+    def prepare(self, course: Course) -> None:
+        """Compile, by a run without steps."""
+        self.run(course._replace(steps=0))
+
     def run(self, course: Course) -> tuple[Array, None]:
         dt, records = np.asarray(course.dt, self.precision), len(course.times) - 1
         model = self.model_of(course).tree_replace({"opt.timestep": dt})

@@ -78,8 +78,10 @@ def prepared(name: str, file: File, tree: tmt.Tree, course: Course) -> tuple[flo
     """Seconds until a run could begin; and of a step without what Python does around it, None where that is nothing."""
     begin, (model, _) = time.perf_counter(), read(name, file, tree)
     model.prepare(course)
-    seconds = time.perf_counter() - begin
     step = model.step_alone(course) if course.steps else None
+    if step:
+        step()  # its code is compiled, or loaded
+    seconds = time.perf_counter() - begin
     if step is None:
         return seconds, None
     count = 1 + int(timing.WARM / timing.fastest({"": step}, 3)[""])

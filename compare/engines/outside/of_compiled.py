@@ -92,7 +92,3 @@ class OfCompiled(ReadModel):
         for vector, places, values in zip(start, (self.qpos, self.dofs, self.dofs), course[:3]):
             vector[places] = values
         return start
-
-    def prepare(self, course: Course) -> None:
-        """Compile, by a run without steps."""
-        self.run(course._replace(q=self.bare.qpos0[self.qpos], v=np.zeros_like(course.v), steps=0))
