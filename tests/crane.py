@@ -55,4 +55,5 @@ def crane(folder: Path) -> Robot:
     path = folder / "crane.xml"
     path.write_text(XML, encoding="utf-8")
     postures = {"down": (0, 0, 0, 0), "raised": (150, 20, 10, 0), "reaching": (20, -60, -30, 15)}
-    return Robot("crane", path, TREE, postures, SCENES)
+    radians = {name: tuple(np.radians(angles).tolist()) for name, angles in postures.items()}
+    return Robot("crane", path, TREE, radians, SCENES)

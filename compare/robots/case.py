@@ -39,9 +39,8 @@ class Robot:
     name: str
     mjcf: Path  # the file that MuJoCo runs
     tree: tmt.Tree  # the stated numbers
-    postures: Mapping[str, Numbers]  # by name, deg (m, quaternion), joints in the order of the Tree
+    postures: Mapping[str, Numbers]  # by name, q (rad, m, quaternions), joints in the order of the Tree
     scenes: tuple[Scene, ...]
-    positions: Mapping[str, Numbers] = field(default_factory=dict)  # further postures as q (rad, m), by name
     ranges: tuple[Range, ...] = ()  # of each joint; (): no ranges
     described: str = ""  # in a sentence: "a human arm"
     symbols: Mapping[str, str] = field(default_factory=dict)  # of joints, for figures
@@ -92,15 +91,14 @@ class Robot:
 
     def posture(self, posture: str | Numbers = ()) -> np.ndarray:
         """q (nq,), rad, of a posture: its name, or numbers in deg, m and quaternions; (): all zero."""
-        if isinstance(posture, str) and posture in self.positions:
-            return np.array(self.positions[posture], dtype=float)
-        numbers = self.postures[posture] if isinstance(posture, str) else posture
-        return self.coordinates.from_degrees(numbers, positions=True) if numbers else np.array(self.tree.zero)
+        if isinstance(posture, str):
+            return np.array(self.postures[posture], dtype=float)
+        return self.coordinates.from_degrees(posture, positions=True) if posture else np.array(self.tree.zero)
 
     @property
     def poses(self) -> dict[str, np.ndarray]:
         """The named postures, rad, (nq,) each; if there are none, all joints at zero."""
-        named = {name: self.posture(name) for name in (*self.postures, *self.positions)}
+        named = {name: self.posture(name) for name in self.postures}
         return named or {"all joints at zero": self.posture()}
 
     def case(self, name: str = "as it is", **changes: Any) -> "Case":
@@ -175,8 +173,7 @@ class Case:
         scene, robot, coordinates = self.scene, self.robot, self.robot.coordinates
         count = self.counted("positions", "{0.position_given}")
         if isinstance(scene.posture, str):
-            named = [*robot.postures, *robot.positions]
-            postures = [name for name in named if len(robot.posture(name)) == coordinates.nq]
+            postures = [name for name, q in robot.postures.items() if len(q) == coordinates.nq]
             accepted = " or ".join(filter(None, [", ".join(postures), count]))
             scene.require("posture", scene.posture in postures, accepted)
         elif scene.posture:

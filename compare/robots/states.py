@@ -65,7 +65,7 @@ def named(robot: Robot) -> Sample:
     rng, q = np.random.default_rng([SEED, 1]), np.array(list(robot.poses.values()))
     most = largest_speeds_and_torques(robot)[:, None]
     speeds, torques = rng.uniform(-most, most, (2, len(q), robot.coordinates.nv))
-    name = "named postures" if robot.postures or robot.positions else "a posture"
+    name = "named postures" if robot.postures else "a posture"
     exact_states = len(q) if robot.coordinates.nv <= MOST_SPEEDS else 0
     return Sample(robot.tree, name, q, speeds, torques, exact_states, tuple(robot.poses))
 

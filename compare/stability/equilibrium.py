@@ -161,10 +161,6 @@ class Equilibrium:
         return float(np.abs(values[overlap > overlap.max() - 1e-6]).max())
 
 
-def posture_names(robot: Robot) -> tuple[str, ...]:
-    return (*robot.postures, *robot.positions)
-
-
 @lru_cache(maxsize=64)
 def equilibrium(robot: Robot, posture: str, damping: float = 0.0) -> Equilibrium:
     """A named posture under TMT's holding torque, with added damping, N m s/rad; without gravity if it floats."""

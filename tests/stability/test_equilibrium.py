@@ -8,7 +8,7 @@ from models import PATHS, random_tree
 from servo_models import robot
 
 import tmt
-from compare.stability.equilibrium import Equilibrium, equilibrium, posture_names
+from compare.stability.equilibrium import Equilibrium, equilibrium
 from tmt import METHODS
 from tmt.methods import amplification
 
@@ -43,7 +43,7 @@ def on_servos(robots):
 @pytest.fixture
 def at(robots, on_servos, name):
     """The posture of a test that has the name of a robot."""
-    return on_servos if name == "on servos" else equilibrium(robots[name], posture_names(robots[name])[0])
+    return on_servos if name == "on servos" else equilibrium(robots[name], next(iter(robots[name].postures)))
 
 
 @pytest.mark.parametrize("name", ["gripper", "pendulum_ball", "random", "on servos"])

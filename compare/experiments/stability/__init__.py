@@ -106,7 +106,7 @@ def add_of_stated(result: StabilityResult, setup: Setup, work: Sequence[Runs]) -
         runs.judge(result, list(chain.from_iterable(runs.rows)))
     result.find(
         "examined", noun=robot.noun, centres=result.centres, saddles=saddles,
-        names=[*robot.postures, *robot.positions], departures=bool(result.tables.get("departure")),
+        names=[*robot.postures], departures=bool(result.tables.get("departure")),
     )  # fmt: skip
 
 

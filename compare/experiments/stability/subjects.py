@@ -10,7 +10,7 @@ import numpy as np
 from ...engines import Engine, Method
 from ...robots import Robot
 from ...robots.case import Case
-from ...stability.equilibrium import equilibrium, posture_names
+from ...stability.equilibrium import equilibrium
 
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint")  # tmt's names
@@ -26,12 +26,9 @@ class Subjects(NamedTuple):
 @lru_cache(maxsize=64)
 def subjects_of(robot: Robot) -> Subjects:
     """What is examined of a robot whose numbers are stated."""
-    names = posture_names(robot)[:MOST_POSTURES]
-    postures, positions = (
-        {name: of[name] for name in names if name in of} for of in (robot.postures, robot.positions)
-    )
-    robot = replace(robot, postures=postures, positions=positions)
-    at = {name: equilibrium(robot, name) for name in posture_names(robot)}
+    names = list(robot.postures)[:MOST_POSTURES]
+    robot = replace(robot, postures={name: robot.postures[name] for name in names})
+    at = {name: equilibrium(robot, name) for name in names}
     centres = [name for name in at if at[name].stays and not at[name].without_stiffness.all()]
     saddles = [name for name in at if at[name].kind == "saddle"]
     centres.sort(key=lambda name: name != robot.kinds.get("centre"))

@@ -15,7 +15,7 @@ from compare.experiments.setup import Setup
 from compare.experiments.stability import departure, limits
 from compare.experiments.stability.subjects import MOST_POSTURES, subjects_of
 from compare.robots.arm import ARM
-from compare.stability.equilibrium import equilibrium, posture_names
+from compare.stability.equilibrium import equilibrium
 
 METHODS = Tmt().methods
 BENT, BALL = equilibrium(ARM, "bent"), equilibrium(ARM, "ball catch")
@@ -49,7 +49,7 @@ def test_known_limits_of_undamped_modes_and_of_methods_that_are_stable_but_on_a_
 def test_of_many_keyframes_the_first_are_looked_at():
     keys = "".join(f'<key name="k{i}" qpos="{0.3 * i}"/>' for i in range(9))
     seen = subjects_of(setup_of_file(SWING.format(keys=f"<keyframe>{keys}</keyframe>")).robot)
-    assert posture_names(seen.robot) == tuple(f"k{i}" for i in range(MOST_POSTURES))
+    assert tuple(seen.robot.postures) == tuple(f"k{i}" for i in range(MOST_POSTURES))
     body = setup_of_file(PATHS["free_body"]).robot
     assert not subjects_of(body).centres and equilibrium(body, "qpos0").sizes[3:].tolist() == [1.0, 1.0, 1.0]
 
