@@ -10,13 +10,11 @@ import numpy as np
 
 import tmt
 from tmt import literal
-from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.tree import GAINS
 
 from ..core.finding import Finding
-from ..core.words import capital, some_of
+from ..core.words import capital
 from .actuators import Controller, Drive
-from .coordinates import KINDS as KINDS
 from .coordinates import Coordinates as Coordinates
 from .coordinates import rates_at as rates_at
 from .printed import Claims, Feature, Printed, Question
@@ -149,44 +147,11 @@ class Case:
     scene: Scene
 
     def __post_init__(self) -> None:
-        scene, names, coordinates = self.scene, self.robot.joints, self.robot.coordinates
-        self.require_posture()
-        units = {"torque": "{0.force}", "speed": "{0.speed_given}", "damping": "{0.force} s/{0.unit}"}
-        for name, unit in (units | {"targets": "{0.movement_given}"}).items():
-            value = getattr(scene, name)
-            is_each = isinstance(value, tuple) and (value or name != "speed")
-            scene.require(name, not is_each or len(value) == coordinates.nv, self.counted("speeds", unit))
-        has_units = len({*coordinates.all_kinds} - {"ball"}) > 1  # of several kinds
-        is_mixed = has_units and isinstance(scene.targets, float) and scene.targets != 0.0
-        scene.require("targets", not is_mixed, self.counted("speeds", "{0.movement_given}"))
+        scene = self.scene
+        scene.require_coordinates(self.robot.coordinates, self.robot.postures)
         if scene.torque == "servos":
             acts = self.controller is not None and any(u is not None for u in self.controller.controls)
             scene.require("torque", acts, "free, hold or numbers: this robot has no actuator that takes part")
-            scene.require("locked", not scene.locked, "no locked joint together with servos")
-        is_right = set(scene.locked) <= set(names) and len(scene.locked) < len(names)
-        scene.require("locked", is_right, f"at most {len(names) - 1} of {some_of(names)}")
-        moving = any(any(scene.speed[coordinates.by_name[name].qd]) for name in scene.locked)
-        scene.require("speed", not moving, f"speed 0 for locked joints ({', '.join(scene.locked)})")
-
-    def require_posture(self) -> None:
-        """WrongField unless the posture is a name, or one number per position and quaternions of length 1."""
-        scene, robot, coordinates = self.scene, self.robot, self.robot.coordinates
-        count = self.counted("positions", "{0.position_given}")
-        if isinstance(scene.posture, str):
-            postures = [name for name, q in robot.postures.items() if len(q) == coordinates.nq]
-            accepted = " or ".join(filter(None, [", ".join(postures), count]))
-            scene.require("posture", scene.posture in postures, accepted)
-        elif scene.posture:
-            scene.require("posture", len(scene.posture) == coordinates.nq, count)
-            lengths = [np.linalg.norm(scene.posture[joint.q]) for joint in coordinates.places.balls]
-            is_unit = all(abs(length - 1.0) <= CLOSE_TO_ONE for length in lengths)
-            scene.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
-
-    def counted(self, what: str, unit: str) -> str:
-        """How many numbers are accepted for the positions or speeds of all joints, and their units."""
-        names: tuple[str, ...] = getattr(self.robot.coordinates, what)
-        units = dict.fromkeys(unit.format(KINDS[kind]) for kind in self.robot.coordinates.all_kinds)
-        return f"{len(names)} numbers, one per joint ({some_of(names)}), in {', '.join(units)}"
 
     @property
     def name(self) -> str:

@@ -1,16 +1,25 @@
 """A scene: a motion of any robot, and the validation of what users give for it."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import real_numbers, shown
+
+from ..core.words import some_of
+from .coordinates import KINDS, Coordinates
 
 SEED = 10  # of every random number in a report
 MAX_STEPS = 20_000  # of a run; the finest of an experiment takes 128 times as many
 TIMES = 1e-9, 1e6  # s, the shortest and the longest that is accepted
 TORQUES = ("free", "hold", "servos")
+UNITS = {  # of what has a number for each speed
+    "torque": "{0.force}", "speed": "{0.speed_given}", "damping": "{0.force} s/{0.unit}",
+    "targets": "{0.movement_given}",
+}  # fmt: skip
 NUMBERS = "posture", "torque", "speed", "damping", "targets", "duration", "dt", "judged"  # or names, or None
 
 
@@ -100,7 +109,43 @@ class Scene:
         if not is_right:
             raise WrongField(self.name, name, getattr(self, name), accepted)
 
+    def require_coordinates(self, coordinates: Coordinates, postures: Mapping[str, Sequence[float]]) -> None:
+        """Raise WrongField unless the numbers are as many as those of a robot, and the names are its own.
+
+        postures: of the robot, by name, (nq,) each.
+        """
+        names, count = coordinates.names, counted(coordinates, "positions", "{0.position_given}")
+        if isinstance(self.posture, str):
+            named = [name for name, q in postures.items() if len(q) == coordinates.nq]
+            accepted = " or ".join(filter(None, [", ".join(named), count]))
+            self.require("posture", self.posture in named, accepted)
+        elif self.posture:
+            self.require("posture", len(self.posture) == coordinates.nq, count)
+            lengths = [np.linalg.norm(self.posture[joint.q]) for joint in coordinates.places.balls]
+            is_unit = all(abs(length - 1.0) <= CLOSE_TO_ONE for length in lengths)
+            self.require("posture", is_unit, "a quaternion w, x, y, z of length 1 for each ball")
+        for name, unit in UNITS.items():
+            value, accepted = getattr(self, name), counted(coordinates, "speeds", unit)
+            is_each = isinstance(value, tuple) and (value or name != "speed")
+            self.require(name, not is_each or len(value) == coordinates.nv, accepted)
+        has_units = len({*coordinates.all_kinds} - {"ball"}) > 1  # of several kinds
+        is_mixed = has_units and isinstance(self.targets, float) and self.targets != 0.0
+        self.require("targets", not is_mixed, counted(coordinates, "speeds", UNITS["targets"]))
+        is_alone = self.torque != "servos" or not self.locked
+        self.require("locked", is_alone, "no locked joint together with servos")
+        is_right = set(self.locked) <= set(names) and len(self.locked) < len(names)
+        self.require("locked", is_right, f"at most {len(names) - 1} of {some_of(names)}")
+        moving = any(any(self.speed[coordinates.by_name[name].qd]) for name in self.locked)
+        self.require("speed", not moving, f"speed 0 for locked joints ({', '.join(self.locked)})")
+
     @property
     def steps(self) -> int:
         """The number of steps of length dt."""
         return round(self.duration / self.dt)
+
+
+def counted(coordinates: Coordinates, what: str, unit: str) -> str:
+    """How many numbers are accepted for the positions or speeds of all joints, and their units."""
+    names: tuple[str, ...] = getattr(coordinates, what)
+    units = dict.fromkeys(unit.format(KINDS[kind]) for kind in coordinates.all_kinds)
+    return f"{len(names)} numbers, one per joint ({some_of(names)}), in {', '.join(units)}"

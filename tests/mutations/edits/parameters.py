@@ -67,7 +67,7 @@ EDITS = (
     ("robots.placement", "refuse_unmatched", "reference.kind[i] != tree.kind[j]", "False", "a slide matches a hinge"),
     ("robots.scene_file", "read_scenes", "scene.name in names", "False", "two scenes have one name"),
     ("robots.scene_file", "scene_of", "'dt' not in values", "False", "a scene needs a dt"),
-    ("robots.case", "Case.require_posture", "all(_1)", "True", "a quaternion may have any length"),
+    ("robots.scene", "Scene.require_coordinates", "all(_1)", "True", "a quaternion may have any length"),
     ("published", "PrintedRow.is_met", "max(_1, _2)", "min(_1, _2)", "one engine that meets a number is enough"),
     ("published", "check_answer", "item.half_digit + rounding", "2.0 * item.half_digit + rounding", "a digit more may be off"),
     ("parameters.numbers", "rows_of", "b - a", "a - b", "differences have the other sign"),
