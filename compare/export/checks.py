@@ -15,7 +15,7 @@ from tmt.export.parameters import Parameters
 
 from ..core import timing
 from ..engines.mujoco import tree_with_sites
-from ..engines.mujoco.calls import loops
+from ..engines.mujoco.runs import loops
 from ..experiments.quantities import QUANTITIES
 from ..judge.agree import closest, share_of
 from ..judge.entries import Entries

@@ -8,7 +8,7 @@ from files import assert_the_same
 import tmt
 from compare.engines import GRID, Setting
 from compare.engines.heyoka import Heyoka
-from compare.engines.mujoco import Mujoco, calls, parse
+from compare.engines.mujoco import Mujoco, parse, runs
 from compare.engines.scipy import Scipy
 from compare.engines.tmt import Tmt
 from compare.judge.entries import Entries
@@ -160,4 +160,4 @@ def test_a_run_that_diverges_is_nan_from_there_on_and_says_why_and_when(followed
 def test_what_cannot_take_part_says_so(monkeypatch, tmp_path, rng):
     monkeypatch.setattr("mujoco.__file__", str(tmp_path / "mujoco" / "__init__.py"))
     monkeypatch.setattr("compare.engines.find_spec", lambda name: None)
-    assert Heyoka().unavailable() and calls.library() is None
+    assert Heyoka().unavailable() and runs.library() is None

@@ -7,7 +7,7 @@ from crane import crane
 
 import tmt
 from compare.engines import GRID, Setting
-from compare.engines.mujoco import calls, engine, parse, read
+from compare.engines.mujoco import engine, parse, read, runs
 from compare.engines.mujoco.parameters import parameters
 from compare.experiments.parameters import stated_of_hinges
 from compare.robots.arm import ARM
@@ -26,11 +26,11 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
         assert np.allclose(compiled[name], stated[name], atol=1e-14), name
 
 
-@pytest.mark.skipif(calls.library() is None, reason="MuJoCo's library is elsewhere")
+@pytest.mark.skipif(runs.library() is None, reason="MuJoCo's library is elsewhere")
 def test_a_loop_repeats_its_calls_at_a_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)
     for q, v in rng.uniform(-2.0, 2.0, (2, 2, 3)):
-        loops = calls.loops(dynamics, q, v, nothing)
+        loops = runs.loops(dynamics, q, v, nothing)
         assert not loops["MuJoCo, equal work"](0).any()
         bias, acceleration = loops["MuJoCo, equal work"](1)
         assert np.array_equal(bias, dynamics.bias(q, v))

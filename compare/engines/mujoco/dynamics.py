@@ -14,36 +14,31 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...robots.case import Case
-from .. import Motion, Prepared, Setting, Tolerance, as_far_as_it_goes, rows_of_states
-from .actuators import engage
+from .. import rows_of_states
 from .inventory import contact_pairs
 from .names import (
-    EVALUATIONS,
     INTEGRATORS,
     OF_A_JOINT,
     element_name,
     geom_name,
     joint_name,
-    joint_places,
     moving,
     number_of_actuators,
     on,
 )
-from .stepper import Stepper
+from .runs import Array, Runs
 from .whole import Whole
 
-Array = np.ndarray | float
 Pair = tuple[np.ndarray, np.ndarray]
 Read = Callable[[mujoco.MjData], ArrayLike]  # a quantity of a state
 
 
-class MujocoDynamics:
+class MujocoDynamics(Runs):
     """MuJoCo with one model; quantities at states q (..., nq), v, tau (..., nv), joints in the case's order.
 
     bodies: their numbers in the model; the axes of a body are those that coincide with the world's at the
     position zero. bare: it is compared with a Tree that has the springs of the joints, and not the bodies
-    that never move. Of a torque that is given only the part beyond the constant part of its actuators is
-    applied.
+    that never move.
     """
 
     def __init__(self, model: mujoco.MjModel, case: Case, bodies: Sequence[int], bare: bool) -> None:
@@ -52,16 +47,8 @@ class MujocoDynamics:
         model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)
         if bare:  # their height would count in the energy
             model.body_mass[np.setdiff1d(np.flatnonzero(~moving(model)), bodies)] = 0.0
-        self.model, self.data = model, mujoco.MjData(model)
-        if case.controller:
-            self.data.ctrl[:], self.data.act[:] = engage(model, case.controller)
-        self.constant: Array = case.controller.torque if case.controller else 0.0
-        self.coordinates, self.bodies, self.bare = case.coordinates, list(bodies), bare
-        by_name = joint_places(model)
-        places = [by_name[name] for name in case.joints]
-        self.joints = np.array([place.joint for place in places])
-        self.qpos = np.array([i for place in places for i in place.qpos])
-        self.dofs = np.array([i for place in places for i in place.dofs])
+        super().__init__(model, case)
+        self.bodies, self.bare = list(bodies), bare
         self.forward(np.array(case.tree.zero))
         self.whole = Whole(model)
         self.zero_axes = self.turns(self.data.xmat)
@@ -225,62 +212,6 @@ class MujocoDynamics:
             return d.energy
 
         return self._each(energies, q, v)
-
-    def run(
-        self, q: Array, v: Array, tau: Array, dt: float, steps: int, method: str, tolerance: Tolerance = None
-    ) -> Motion:
-        """Motion under constant torque: q, v (..., steps + 1, n), NaN from where it diverges."""
-        stepper = self.stepper(dt, method, tolerance)
-        batch, states = self.states(stepper, q, v, tau)
-        rolled, qpos, qvel = stepper.roll(states, steps), stepper.places["qpos"], stepper.places["qvel"]
-        q_path = np.concatenate([states[:, None, qpos], rolled.q], axis=1)
-        v_path = np.concatenate([states[:, None, qvel], rolled.v], axis=1)
-        return self.motion(q_path, v_path, dt, batch, EVALUATIONS[method])
-
-    def prepare(self, q: Array, v: Array, tau: Array, setting: Setting, method: str) -> Prepared:
-        steps, every = int(setting.steps or 0), setting.every
-        dt = setting.duration / steps
-        stepper = self.stepper(dt, method, setting.tolerance)
-        state = self.states(stepper, q, v, tau)[1][0]
-
-        def read(physics: np.ndarray) -> Motion:
-            path = np.vstack([state[: physics.shape[1]], physics])  # time, qpos, qvel are first in both
-            path[1 + stepper.taken(physics) :] = np.nan
-            qpos, qvel = (path[None, :, stepper.places[name]] for name in ("qpos", "qvel"))
-            motion = self.motion(qpos, qvel, dt, (), EVALUATIONS[method])
-            return motion._replace(t=setting.times, q=motion.q[::every], v=motion.v[::every])
-
-        return stepper.loop(state, steps), read
-
-    def motion(
-        self, qpos: np.ndarray, qvel: np.ndarray, dt: float, batch: tuple[int, ...], evaluations: int
-    ) -> Motion:
-        """The Motion of runs, (runs, steps + 1, n), and why some end early. evaluations: of a step."""
-        q, v, steps = qpos[..., self.qpos], qvel[..., self.dofs], qpos.shape[1] - 1
-        t, ended = dt * np.arange(steps + 1), np.full(len(q), None, dtype=object)
-        for k, run in enumerate(np.concatenate([q, v], axis=-1)):
-            run, ended[k] = as_far_as_it_goes(t, run, run[0], "a number is not finite")
-            q[k], v[k] = run[:, : q.shape[-1]], run[:, q.shape[-1] :]
-        q, v = (path.reshape(*batch, steps + 1, path.shape[-1]) for path in (q, v))
-        return Motion(t, q, v, len(ended) * steps * evaluations, ended.reshape(batch)[()], steps)
-
-    def stepper(self, dt: float, method: str, tolerance: Tolerance = None) -> Stepper:
-        """Steps of dt, s, by an integrator. ValueError for a tolerance."""
-        if tolerance is not None:
-            raise ValueError(f"MuJoCo's {method} has a fixed step and takes no tolerance")
-        return Stepper(self.model, dt, method)
-
-    def states(
-        self, stepper: Stepper, q: Array, v: Array = 0.0, tau: Array = 0.0
-    ) -> tuple[tuple[int, ...], np.ndarray]:
-        """The batch shape and the states, (runs, n), of a stepper under constant torque."""
-        batch, rows = rows_of_states(q, v, tau - self.constant)
-        states = np.tile(stepper.reset, (len(rows[0]), 1))
-        values = zip(("qpos", "qvel", "qfrc_applied"), (self.qpos, self.dofs, self.dofs), rows)
-        for name, columns, row in values:
-            states[:, stepper.places[name].start + columns] = row
-        states[:, stepper.places["ctrl"]], states[:, stepper.places["act"]] = self.data.ctrl, self.data.act
-        return batch, states
 
     def _each(self, read: Read, q: Array, v: Array = 0.0, tau: Array = 0.0) -> np.ndarray:
         """read(data) after mj_forward at each state, stacked to the batch shape of the states."""

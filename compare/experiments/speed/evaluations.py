@@ -39,7 +39,7 @@ Loop = tuple[
 
 def loops(setup: Setup) -> list[Loop]:
     """All ways, compiled and not yet timed; of MuJoCo none where its library is not found."""
-    from ...engines.mujoco import calls  # here, as importing MuJoCo takes long
+    from ...engines.mujoco import runs  # here, as importing MuJoCo takes long
     from ...engines.mujoco.dynamics import MujocoDynamics
 
     tree, coordinates = setup.robot.tree, setup.robot.coordinates
@@ -47,7 +47,7 @@ def loops(setup: Setup) -> list[Loop]:
     rng = np.random.default_rng([SEED, 2])
     states = [coordinates.random(rng, many), *rng.uniform(-3.0, 3.0, (2, many, coordinates.nv))]
     dynamics = cast(MujocoDynamics, setup.engines["mujoco"].of(setup.robot.case()))
-    of_mujoco = calls.loops(dynamics, *(values[0] for values in states)).items()
+    of_mujoco = runs.loops(dynamics, *(values[0] for values in states)).items()
     ready: list[Loop] = [(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
     compiled = Evaluator(tree, "acceleration")
     for count in dict.fromkeys((FEW, many)):

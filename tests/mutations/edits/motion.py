@@ -20,7 +20,7 @@ EDITS = (
     ("run", "exchanged", "case.tau - fed_back_at(*_1)", "case.tau + fed_back_at(*_1)", "servos push the other way"),
     ("run", "work", "moved * mean", "0.0 * mean", "the work of servos is a gain"),
     ("engine", "methods_for", "lone or tree.has_gains", "lone", "velocity gains are thought explicit in implicitfast"),
-    ("mujoco.dynamics", "MujocoDynamics.states", "tau - self.constant", "tau", "the torque of servos acts twice"),
+    ("mujoco.runs", "Runs.states", "tau - self.constant", "tau", "the torque of servos acts twice"),
     ("run", "LEAST_JUDGED", "0.1", "0.0", "a run of a file that is judged until 0 s agrees"),
     ("run", "widths", "np.minimum(_1, most)", "0.0 * _1 + most", "a band wider than the movement judges it"),
     ("run", "widths", "largest >= STILL * of_unit", "True", "a joint that hardly moves ends the time that is judged"),

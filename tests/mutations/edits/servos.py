@@ -20,7 +20,7 @@ EDITS = (
     ("case", "Case.controller", "self.robot.coordinates.from_degrees(_1, positions=False)", "_1", "targets are moved by radians"),
     ("mujoco.stepper", "Stepper.roll", "self.data.warning.number.any()", "False", "a full memory ends a run"),
     ("mujoco.stepper", "Stepper.taken", "int(np.argmax(_1))", "len(path) - 1", "steps in which time stands still are taken"),
-    ("mujoco.dynamics", "MujocoDynamics.prepare", "stepper.taken(physics)", "len(physics)",
+    ("mujoco.runs", "Runs.prepare", "stepper.taken(physics)", "len(physics)",
      "a prepared run goes on where time stands still"),
     ("mujoco.stepper", "Stepper.loop", "initial_warmstart=warmstart", "initial_warmstart=0.0 * warmstart",
      "each roll starts the solver anew"),
