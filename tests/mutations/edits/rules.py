@@ -67,7 +67,7 @@ EDITS = (
     ("states", "check_mass", "mujoco_M", "M", "MuJoCo's matrix is definite if ours is", 2),
     ("states", "check_definiteness", "(_1 / _2).min()", "(_1 / _2).max()", "the best state decides"),
     ("judge.entries", "Entries.added", "translation + rotation + _1", "100 * _0", "the scale x 100"),
-    ("judge.entries", "Entries.weight", "g * _1", "100 * g * _1", "the scale x 100"),
+    ("judge.entries", "Entries.weight", "_1 * self.momentum", "100 * _1 * self.momentum", "the scale x 100"),
     ("judge.entries", "Entries.bias", "_1 + _2 + self.weight", "_1 + 100 * _2 + self.weight", "the scale x 100"),
     ("judge.entries", "Entries.residual", "_1 + force", "_1", "without the forces"),
     ("judge.entries", "Entries.closing", "2.0 * _1", "200.0 * _1", "the scale x 100"),
