@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from ..core.rows import Row, column
+from ..engines.mujoco.inventory import light_joints
 from ..engines.mujoco.names import element_name
 from ..engines.mujoco.reading import Reading
 from .motion import Posture, motion_of
@@ -118,6 +119,7 @@ class Answer(NamedTuple):
 
     recipes: of the runs at the longest stable step in use, and at the first that fails.
     smaller: where the step in use fails, the largest smaller push after which the limit is longer, and that limit.
+    light: of joints that move first, see light_joints.
     """
 
     rows: list[StepLimitRow]
@@ -126,6 +128,7 @@ class Answer(NamedTuple):
     stops: list[Remedy]
     recipes: list[dict[str, Any]]
     smaller: tuple[float, float] | None
+    light: Mapping[str, tuple[float, float, float]]
 
     @property
     def own(self) -> StepLimitRow | None:
@@ -159,7 +162,9 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
         )
         for (push, dt, name, *_), verdict in pushed.tried.items()
     ]  # fmt: skip
-    return Answer(rows, tried, found, stops, recipes_of(pushed, own), smaller)
+    first = {row.moves_first for row in rows}
+    light = {name: numbers for name, numbers in light_joints(reading.model).items() if name in first}
+    return Answer(rows, tried, found, stops, recipes_of(pushed, own), smaller, light)
 
 
 def recipes_of(pushed: Pushed, row: StepLimitRow | None) -> list[dict[str, Any]]:

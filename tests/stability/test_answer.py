@@ -203,3 +203,17 @@ def limit_row(up_to, fails, stable, integrator="Euler"):
 ])  # fmt: skip
 def test_the_worst_posture_of_the_files_integrator_is_that_of_a_fleet(rows, worst):
     assert worst_step(rows) == worst
+
+
+@pytest.mark.parametrize("share, is_told", [(0.99, True), (1.01, False)])
+def test_an_inertia_that_no_body_of_the_mass_has_is_told_where_it_moves_first(share, is_told):
+    """A turntable of 20 kg; a ball of osmium, of which a cubic metre has 22,590 kg, has 2/5 m r^2."""
+    radius = (3.0 * 20.0 / (4.0 * np.pi * 22_590.0)) ** (1.0 / 3.0)
+    ball = 0.4 * 20.0 * radius**2
+    text = f"""<mujoco><option timestep="0.002" integrator="Euler"/><worldbody><body><joint name="turn" axis="0 0 1"/>
+<inertial pos="0 0 0" mass="20" diaginertia="{ball} {ball} {share * ball}"/></body></worldbody>
+<actuator><position joint="turn" kp="5000" kv="900"/></actuator></mujoco>"""
+    found = asked(text)
+    assert found.rows[0].moves_first == "turn" and list(found.light) == ["turn"] * is_told
+    if is_told:
+        assert found.light["turn"] == pytest.approx((share * ball, 20.0, ball), rel=1e-12)

@@ -140,6 +140,21 @@ def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
     return np.concatenate([chosen, np.column_stack([m.pair_geom1, m.pair_geom2])]).astype(int)
 
 
+def light_joints(m: mujoco.MjModel) -> dict[str, tuple[float, float, float]]:
+    """Joints that turn less inertia at qpos0 than a ball of the densest element with the mass that they carry.
+
+    By name: the inertia, kg m2, the mass, kg, and the inertia of the ball. No body has so little: a placeholder.
+    """
+    found = {}
+    for dof in np.flatnonzero([kind_of(m, joint) in ("hinge", "ball") for joint in m.dof_jntid]).tolist():
+        mass = float(m.body_subtreemass[m.dof_bodyid[dof]])
+        of_ball = 0.4 * mass * (0.75 * mass / (np.pi * DENSEST)) ** (2 / 3)
+        if m.dof_M0[dof] < of_ball:
+            found[element_name(m, "joint", m.dof_jntid[dof])] = float(m.dof_M0[dof]), mass, of_ball
+    return found
+
+
+DENSEST = 22_590.0  # kg/m3, of osmium
 MOST = 1e30  # in size, of every number that is compared: products of several are still doubles
 STEPS = 1e-6, 5.0  # s, of the file
 MOST_SPEEDS = 1000  # of a model: Mbar of a state has the square of it

@@ -80,6 +80,8 @@ def add(result: StabilityResult, work: Work) -> None:
     if work.error is not None:
         tell(result, "within", rows=first.rows, error=work.error)
     tell_of_row(result, first.rows[0])
+    for joint, (inertia, mass, least) in first.light.items():
+        tell(result, "light", joint=joint, inertia=inertia, mass=mass, least=least)
     damped = [row for row in first.rows if row.is_damped]
     if damped:
         tell(result, "damps", rows=damped)
