@@ -33,6 +33,8 @@ axis="0 1 0" damping="0.3" pos="0 0 0.1" armature="0.02"/>{ROD}<body pos="0 0.1 
 axis="0 1 0" ref="20" stiffness="2" frictionloss="0.1"/>{ROD}<body pos="0 0 -1"><joint name="slide" type="slide" axis="1 0 1"
 stiffness="50" damping="1"/>{ROD}<body name="ball" pos="0.1 0 0"><joint type="ball" damping="0.5"/>{ROD}</body></body></body>
 </body></worldbody><actuator><position joint="hip" kp="500" kv="1"/></actuator></mujoco>"""
+MASSLESS = f"""<mujoco><worldbody><body name="yoke"><joint name="a" axis="0 1 0"/><body><joint name="b" axis="1 0 0"/>{ROD}
+</body></body></worldbody></mujoco>"""
 STIFF = SWING.replace('ref="20" stiffness="2"', 'stiffness="900" damping="2"')
 WRONG = """
 from numpy import cos
@@ -61,11 +63,13 @@ def report_of(tmp_path, *words, status=0):
 
 @pytest.mark.parametrize("name, experiment", [
     ("swing", "acceleration"), ("swing", "mass"), ("mixed", "acceleration"), ("free_body", "gravity"), ("arm", "acceleration"),
+    ("massless", "acceleration"),
 ])  # fmt: skip
 def test_the_worst_states_of_any_joints_are_repeated(name, experiment, tmp_path, capsys):
     """With armature, springs, friction and servos that the equations do not have, and M and weight without an engine."""
     (tmp_path / "swing.xml").write_text(SWING)
-    given = [] if name == "arm" else ["--mjcf", str(PATHS.get(name, tmp_path / "swing.xml"))]
+    (tmp_path / "massless.xml").write_text(MASSLESS)
+    given = [] if name == "arm" else ["--mjcf", str(PATHS.get(name, tmp_path / f"{name}.xml"))]
     script = report_of(tmp_path, experiment, *given)
     status, lines = repeated(script)
     quantities = {"mass": ["Mbar"], "gravity": ["holding torque"], "acceleration": ["bias", "qdd"]}[
@@ -149,9 +153,8 @@ def test_a_wrong_number_of_the_report_is_found(name, runs):
 def test_rows_that_have_no_worst_state_are_left_out():
     """Those of another engine have quantities of the same names."""
     of = section("engines", GOOD, rows=[{"quantity": "Mbar", "worst_difference": 1.0, "worst_entry": "0"}])
-    said = script(
-        Report([of], ARM, {"command": "c"}, "", plain={"why": "", "zero": None, "mass_alone": False})
-    )
+    plain = {"why": "", "zero": None, "mass_alone": False, "least": None}
+    said = script(Report([of], ARM, {"command": "c"}, "", plain=plain))
     assert '"states": []' in said and compile(said, "reproduce.py", "exec")
 
 

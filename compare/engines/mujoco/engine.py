@@ -15,6 +15,7 @@ from ...robots.case import Case
 from .. import Engine, Method
 from .dynamics import MujocoDynamics
 from .inventory import NOT_HAD_FIELDS, switch_off
+from .locked import LEAST
 from .names import FROM_4, INTEGRATORS, bit, rotors
 from .source import Source
 
@@ -81,14 +82,17 @@ class Mujoco(Engine):
 
         qpos: positions, with the places of the case's joints in them; dofs: those of their speeds. zero: fields of the model
         to be set to zero, where all that a Tree does not have is switched off, else None. gravity: of the equations, m/s2.
-        mass_alone: M follows from masses, tensors and armature of joints alone. why: why MuJoCo does not read this file.
+        mass_alone: M follows from masses, tensors and armature of joints alone. least: a mass for links without one, which
+        MuJoCo refuses; None: there are none. why: why MuJoCo does not read this file.
         """
         dynamics, m, source = self.of(case), self.source.model, self.source
         zero = [name for name in (*NOT_HAD_FIELDS, "tendon_armature") if np.any(getattr(m, name, 0.0))]
-        why = "floating" if source.floating else "meshes" if source.missing else ""
+        is_packed = "package://" in source.text
+        why = "--floating" if source.floating else "its meshes" if source.missing or is_packed else ""
         return {
             "first": dynamics.data.qpos.tolist(), "qpos": dynamics.qpos.tolist(), "dofs": dynamics.dofs.tolist(),
             "zero": zero if self.bare else None, "gravity": dynamics.model.opt.gravity.tolist(),
+            "least": LEAST if (m.body_mass[m.jnt_bodyid] == 0.0).any() else None,
             "mass_alone": not rotors(m).any() and (self.bare or not np.any(m.tendon_armature)),
             "why": why if isinstance(source.origin, Path) else "no file",
         }  # fmt: skip
