@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -39,7 +40,7 @@ from compare.experiments.engines.readings import owner
 from compare.judge.entries import Entries
 from compare.judge.scale import FACTOR
 from compare.robots.arm import ARM
-from compare.run.examine import not_chosen
+from compare.run import examine
 from compare.run.reference import compared_with
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -347,10 +348,14 @@ def test_an_engine_that_does_not_run_the_file_is_not_judged_by_it():
 
 
 def test_engines_are_chosen_by_their_names():
-    others = not_chosen("drake,mjx")
-    assert "mjx_float32" in others and not others & {"drake", "mjx", "mujoco"}
+    def chosen(names):
+        options = SimpleNamespace(quick=True, get={"engines": names}.get)
+        return examine.setup_of(compared_with("arm", None), options).engines
+
+    named = chosen("drake,mjx")
+    assert {"drake", "mjx", "mujoco", "tmt"} <= named.keys() and not {"mjx_float32", "newton"} & named.keys()
     with pytest.raises(Refused, match="draek is not an engine that reads"):
-        not_chosen("draek")
+        chosen("draek")
 
 
 def test_without_another_engine_there_is_nothing_to_answer(monkeypatch):
