@@ -21,7 +21,7 @@ NUMBER = re.compile(r"(?<![\w])[-+]?\d+\.?\d*(?:e[-+]?\d+)?")
 
 def test_it_is_short_and_has_all_that_it_links():
     assert BLOCKS and {language for language, _ in BLOCKS} <= {"python", "sh", "text", "toml"}
-    assert len(BLOCKS) == README.count("\n```") / 2 and len(README.splitlines()) <= 150
+    assert len(BLOCKS) == README.count("\n```") / 2 and len(README.splitlines()) <= 160
     linked = re.findall(r"\]\(([^)]+)\)", README)
     pictures = [ROOT / name for name in linked if name.endswith((".png", ".gif"))]
     assert len(pictures) == 2 and (ROOT / "reports" / "page.png").stat().st_size < 150_000
