@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from textwrap import shorten
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tmt.derivation.coordinates import KINDS, Coordinates, Joint
-from tmt.derivation.mechanism import Indices, Mechanism, Names, Numbers, Rows
+from tmt.derivation.coordinates import Joint
+from tmt.derivation.mechanism import Mechanism
 
-from . import singular
+from . import checks, singular
 from .joint import Joint as JointOfTree
 from .joint import fields_of
 from .lock import locked
-from .values import CLOSE_TO_ONE, listed, names, numbers_of, shown
+from .values import names, numbers_of, shown
 
 # fields that may be left out
 OPTIONAL = ("reference", "armature", "stiffness", "rest", "site_offset", "site_turn")
@@ -76,15 +75,26 @@ class Tree(Mechanism[float]):
     ... )
     >>> print(tmt.mass_matrix(pendulum, [0.0]))  # 0.1 + 1 kg (0.5 m)^2
     [[0.35]]
-    >>> dataclasses.replace(pendulum, mass=[2.0]).mass
+    >>> dataclasses.replace(pendulum, mass=(2.0,)).mass
     (2.0,)
     """
+
+    if TYPE_CHECKING:  # what is accepted, which becomes nested tuples
+
+        def __init__(
+            self, joint_names: Sequence[str], parent: ArrayLike, offset: ArrayLike, axis: ArrayLike,
+            damping: ArrayLike, body_names: Sequence[str], body_joint: ArrayLike, mass: ArrayLike,
+            com: ArrayLike, inertia: ArrayLike, gravity: ArrayLike, kind: Sequence[str] = (),
+            armature: ArrayLike = (), stiffness: ArrayLike = (), rest: ArrayLike = (), reference: ArrayLike = (),
+            position_gain: ArrayLike = (), speed_gain: ArrayLike = (), site_names: Sequence[str] = (),
+            site_joint: ArrayLike = (), site_offset: ArrayLike = (), site_turn: ArrayLike = (),
+        ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
         for name in ("joint_names", "body_names", "site_names"):
             self._set(name, names(name, getattr(self, name)))
         n, m, k = len(self.joint_names), len(self.body_names), len(self.site_names)
-        self._set("kind", _kinds(self.kind, n))
+        self._set("kind", checks.kinds(self.kind, n))
         nq, nv = self.coordinates.nq, self.coordinates.nv
         shapes = {
             "parent": (n,), "offset": (n, 3), "axis": (nv, 3), "damping": (nv,),
@@ -98,24 +108,24 @@ class Tree(Mechanism[float]):
                 value = self.zero if name == "rest" else np.broadcast_to(ABSENT.get(name, 0.0), shape)
             self._set(name, numbers_of(name, value, shape))
         for name in GAINS:
-            self._set(name, _gain(name, getattr(self, name), self.coordinates))
+            self._set(name, checks.gain(name, getattr(self, name), self.coordinates))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
-        self._set("parent", _indices("parent", self.parent, range(n)))
-        self._set("body_joint", _indices("body_joint", self.body_joint, [n] * m))
-        self._set("site_joint", _indices("site_joint", self.site_joint, [n] * k))
+        self._set("parent", checks.indices("parent", self.parent, range(n)))
+        self._set("body_joint", checks.indices("body_joint", self.body_joint, [n] * m))
+        self._set("site_joint", checks.indices("site_joint", self.site_joint, [n] * k))
         for name, turn in zip(self.site_names, self.site_turn):
-            _check_axes(f"Tree.site_turn of {name!r}", np.array(turn).T)
-        self._set("axis", tuple(_direction(i, axis) for i, axis in enumerate(self.axis)))
+            checks.check_axes(f"Tree.site_turn of {name!r}", np.array(turn).T)
+        self._set("axis", tuple(checks.direction(i, axis) for i, axis in enumerate(self.axis)))
         for name, unit in NOT_NEGATIVE.items():
             if min(getattr(self, name)) < 0.0:
                 values = shown(getattr(self, name))
                 raise ValueError(f"Tree.{name} is {values}; values of at least 0 {unit} are expected")
         for i, joint in enumerate(self.coordinates.joints):
             if joint.kind == "ball":
-                _check_ball(i, np.array(self.axis[joint.qd]), self.reference[i], self.rest[joint.q])
+                checks.check_ball(i, np.array(self.axis[joint.qd]), self.reference[i], self.rest[joint.q])
         for name, inertia in zip(self.body_names, self.inertia):
-            _check_inertia(name, np.array(inertia))
+            checks.check_inertia(name, np.array(inertia))
         singular.check_tree(self)
 
     def _set(self, name: str, value: Any) -> None:
@@ -153,7 +163,7 @@ class Tree(Mechanism[float]):
         >>> print(tmt.mass_matrix(double, [0.0, 0.0])[1, 1].round(9))  # 0.5 kg (0.4 m)^2
         0.08
         """
-        return cls(gravity=gravity, **fields_of(joints) | fields)  # type: ignore[arg-type]
+        return cls(gravity=gravity, **fields_of(joints) | fields)
 
     @property
     def nq(self) -> int:
@@ -216,65 +226,3 @@ def checked_model(model: Any) -> None:
 def stated(value: Any) -> str:
     """All fields of a Tree or another dataclass: equal for equal ones of a class alone."""
     return repr([getattr(value, field.name) for field in fields(value)])
-
-
-def _kinds(values: Any, n: int) -> Names:
-    if isinstance(values, (list, tuple)) and not values:
-        return ("hinge",) * n
-    kinds = listed(values) or ()
-    if len(kinds) != n or not all(isinstance(kind, str) and kind in KINDS for kind in kinds):
-        raise ValueError(f"Tree.kind is {shown(values)}; {n} of {', '.join(KINDS)} are expected")
-    return tuple(map(str, kinds))
-
-
-def _indices(name: str, values: Iterable[float], ends: Iterable[int]) -> Indices:
-    indices = list(values)
-    for i, (index, end) in enumerate(zip(indices, ends)):
-        if index != int(index) or not -1 <= index < end:
-            expected = f"a whole number from -1 to {end - 1} is expected"
-            raise ValueError(f"Tree.{name}[{i}] is {index:g}; {expected}")
-    return tuple(map(int, indices))
-
-
-def _gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
-    if isinstance(values, tuple | list) and not values:
-        return ()
-    rows = numbers_of(name, values, (coordinates.nv, coordinates.nv))
-    fed = np.array(rows) != 0.0
-    for i, joint in enumerate(coordinates.joints):
-        if joint.kind == "ball" and (fed[joint.qd].any() or fed[:, joint.qd].any()):
-            expected = "entries of hinges and slides alone are accepted"
-            raise ValueError(f"Tree.{name} has an entry of joint {i}, a ball; {expected}")
-    return rows if fed.any() else ()
-
-
-def _check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers[float]) -> None:
-    _check_axes(f"the axes of joint {i}, a ball,", axes)
-    if reference:
-        raise ValueError(f"Tree.reference[{i}] is {reference:g}; 0 is expected of a ball")
-    if abs(math.hypot(*rest) - 1.0) > CLOSE_TO_ONE:
-        raise ValueError(f"Tree.rest of joint {i}, a ball, is {rest}; a quaternion of length 1 is expected")
-
-
-def _check_axes(whose: str, axes: NDArray[np.float64]) -> None:
-    if np.abs(axes @ axes.T - np.eye(3)).max() > 1e-9 or np.linalg.det(axes) < 0.0:
-        raise ValueError(f"{whose} are {axes.tolist()}; a right-handed frame is expected")
-
-
-def _direction(i: int, axis: Numbers[float]) -> Numbers[float]:
-    exponent = math.frexp(max(map(abs, axis)))[1]
-    axis = tuple(math.ldexp(a, -exponent) for a in axis)  # exact, and the squares neither overflow nor vanish
-    length = float(np.linalg.norm(axis))
-    if length == 0.0:
-        raise ValueError(f"Tree.axis[{i}] is zero; a direction is expected")
-    return tuple(a / length for a in axis)
-
-
-def _check_inertia(name: str, inertia: NDArray[np.float64]) -> None:
-    scale = np.abs(inertia).max()
-    if np.abs(inertia - inertia.T).max() > 1e-12 * scale:
-        raise ValueError(f"the inertia of {name!r} is not symmetric: {inertia.tolist()}")
-    a, b, c = np.linalg.eigvalsh(inertia)
-    if a + b < c - 1e-12 * scale:  # as b is at most c, this finds an a below 0 too
-        expected = "each must be at least 0 and none larger than the other two together"
-        raise ValueError(f"the inertia of {name!r} has principal values {a:g}, {b:g}, {c:g}; {expected}")

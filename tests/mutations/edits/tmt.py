@@ -1,17 +1,17 @@
 """Edits of what tmt refuses and of what its compiled code reports."""
 
 EDITS = (
-    ("tree", "_check_inertia", "np.abs(inertia - inertia.T).max() > _1", "False", "an inertia need not be symmetric"),
-    ("tree", "_check_inertia", "a + b < _1", "False", "one principal inertia may be larger than the other two"),
+    ("checks", "check_inertia", "np.abs(inertia - inertia.T).max() > _1", "False", "an inertia need not be symmetric"),
+    ("checks", "check_inertia", "a + b < _1", "False", "one principal inertia may be larger than the other two"),
     ("values", "numbers_of", "not np.isfinite(array).all()", "False", "a number of a Tree may be infinite"),
     ("values", "_state", "not np.isfinite(array).all()", "False", "a state may be infinite"),
     ("straight", "LIMIT", "2.0**49", "2.0**60", "hinges may turn beyond 2^49 rad"),
     ("singular", "check_tree", "turning.any(axis=-1).all()", "False", "a Tree may be singular at every q"),
     ("implicit", "CLOSE", "1e-10", "1e-2", "Newton's method stops at two digits"),
     ("implicit", "ImplicitRungeKutta.step", "raise _1", "return self.finish(q, qd, dt, a)", "no failure is seen"),
-    ("tree", "_check_axes", "np.linalg.det(axes) < 0.0", "False", "the axes of a ball may be left-handed"),
-    ("tree", "_gain", "_1 or fed[:, joint.qd].any()", "_1", "a ball may be fed back to others"),
-    ("tree", "_direction", "_1 == 0.0", "False", "an axis may be zero"),
+    ("checks", "check_axes", "np.linalg.det(axes) < 0.0", "False", "the axes of a ball may be left-handed"),
+    ("checks", "gain", "_1 or fed[:, joint.qd].any()", "_1", "a ball may be fed back to others"),
+    ("checks", "direction", "_1 == 0.0", "False", "an axis may be zero"),
     ("simulation", "by_series", "tolerance=tolerance", "tolerance=1e-33", "the tolerance of series is ignored"),
     ("simulation", "singular_in", "alive - 1", "0", "the last state is not looked at", 1),
     ("articulated", "outward", "2.0 * qd[_1]", "qd[_1]", "half of a slide's Coriolis acceleration"),
