@@ -105,7 +105,9 @@ def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
         return [*report.answer, *(verdict[-1:] if failing.differing or failing.broke else []), *others]
     causes = [line for cause in report.causes for line in lines_of(cause)]
     checks = [f"  {check}" for check in failing.differing[:MOST_FAILING]] if not causes else []
-    answer = report.answer if not causes or report.sections[0].record.compares else []
+    section = report.sections[0]
+    has_number = section.result.headline and (section.record.compares or not causes)
+    answer = report.answer if has_number or report.top else []
     return [*verdict, *causes, *checks, *mended, *answer, *others]
 
 

@@ -84,11 +84,10 @@ def of_inverse_dynamics(forces: Function, coordinates: Coordinates) -> dict[str,
         return forces(q, qd, 0.0 * qd)
 
     def mass_matrix(q: np.ndarray) -> np.ndarray:
-        still = np.zeros((*np.shape(q)[:-1], coordinates.nv))
-        pushes = [still, *(still + row for row in PUSH * np.eye(coordinates.nv))]
-        at_rest, *pushed = (np.asarray(forces(q, still, push), float) for push in pushes)
-        columns = [values - at_rest for values in pushed]
-        return np.stack([column.reshape(still.shape) for column in columns], axis=-1) / PUSH
+        still = np.zeros(coordinates.nv)
+        pushes = [still, *(PUSH * np.eye(coordinates.nv))]
+        at_rest, *pushed = (np.asarray(forces(q, still, push), float).ravel() for push in pushes)
+        return np.stack([values - at_rest for values in pushed], axis=1) / PUSH
 
     return {"mass_matrix": mass_matrix, "bias": bias}
 
