@@ -72,6 +72,25 @@ def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", 
     return M + np.diag(tree.armature), h
 
 
+def with_another_gradient(tree: tmt.Tree, q, qd, row: int, factor: float):
+    """Mbar and h, of which one row has the gradient of the kinetic energy d(qd' Mbar qd / 2)/dq = C' qd times a factor."""
+    M, h = by_composite(tree, q, qd)
+    C = tmt.coriolis_matrix(tree, q, qd)
+    return M, h + (1.0 - factor) * np.einsum("sji,sj->si", C, qd) * np.eye(len(tree.axis))[row]
+
+
+def with_sine_for_cosine(tree: tmt.Tree, q, qd, axis: int):
+    """Mbar and h with T' m T and T' m (a - g) of the first body, whose T has sine for cosine of its hinge along one axis."""
+    M, h = by_composite(tree, q, qd)
+    moved, (T, _) = q.copy(), literal.jacobians(tree, q)
+    moved[:, 0] = np.pi / 2.0 - q[:, 0]
+    right, wrong = T[:, 0], T[:, 0].copy()
+    wrong[:, axis] = literal.jacobians(tree, moved)[0][:, 0, axis] * (1.0 - 2.0 * (np.arange(len(tree.axis)) == 0))
+    force = tree.mass[0] * (literal.convective_terms(tree, q, qd)[0][:, 0] - np.array(tree.gravity))
+    inertias = (tree.mass[0] * np.swapaxes(J, 1, 2) @ J for J in (wrong, right))
+    return M + next(inertias) - next(inertias), h + np.einsum("sci,sc->si", wrong - right, force)
+
+
 def by_composite(tree: tmt.Tree, q, qd, edited: tmt.Tree | None = None):
     M, h = mass_matrix_and_bias(edited or tree, list(q.T), list(qd.T))
     M = [np.stack([np.broadcast_to(x, len(q)) for x in row], axis=-1) for row in M]
@@ -137,6 +156,19 @@ def faults_of(robot: str, tree: tmt.Tree, rng: np.random.Generator) -> list[Faul
         masses[a], masses[b] = masses[b], masses[a]
         both = f"{tree.body_names[a]} and {tree.body_names[b]}"
         add("exchange", f"masses of {both}", by_composite, edited=replace(tree, mass=masses))
+    for b, body in enumerate(tree.body_names):
+        tensors = [np.array(I)[::-1, ::-1] if k == b else np.array(I) for k, I in enumerate(tree.inertia)]
+        edited = replace(tree, inertia=np.array(tensors).tolist())
+        add("exchange", f"inertia of {body}, axes x and z exchanged", by_composite, edited=edited)
+    for i, name in enumerate(names):
+        for factor, explains in {0.0: "left out", -1.0: "of the other sign"}.items():
+            place = f"gradient of the kinetic energy in h[{name}]: {explains}"
+            add("lagrange", place, with_another_gradient, row=i, factor=factor)
+    if tree.body_joint[0] == 0:
+        for axis, name in enumerate("xyz"):
+            explains = f"sine and cosine of {names[0]} exchanged in {name}, with the right accelerations"
+            place = f"CoM of {tree.body_names[0]}: {explains}"
+            add("sine", place, with_sine_for_cosine, axis=axis)
     order = rng.permutation(n).tolist()
     if order != sorted(order) and len(set(tree.kind)) == 1:
         add("convention", "order of the joints", in_own_joints, order=order)

@@ -16,8 +16,8 @@ from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
-from ..diagnosis.model import ROUNDED
-from ..diagnosis.noise import through_noise
+from ..diagnosis.layout import ROUNDED
+from ..diagnosis.regression import through_noise
 from ..engines.own import QUICK, OwnEquations
 from ..judge.entries import Entries
 from ..robots.coordinates import Coordinates
@@ -297,5 +297,5 @@ def of_noise(comparison: Comparison, name: str) -> Why | None:
     found = through_noise(tree, Values.of(tree, q, 0.0 * qd if name == "gravity" else qd, M, h), qdd)
     if found is None:
         return None
-    text = say(Finding("agreement", "noisy" if found.place else "noise_alone", {"found": found}))
-    return Why(text, found.place is not None)
+    text = say(Finding("agreement", "noisy" if found.cause else "noise_alone", {"found": found}))
+    return Why(text, found.cause is not None)

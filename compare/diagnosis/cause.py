@@ -1,6 +1,6 @@
 """The result of a diagnosis, and causes of it that are put together. Their text is in causes.md.jinja."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -62,3 +62,20 @@ def ranked(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     """The causes of one rank in words, each with the number of the others."""
     tied = [replace(cause, tied=len(causes) - 1) for cause in causes]
     return tuple(replace(cause, text=say(Finding(TEMPLATE, "cause", {"cause": cause}))) for cause in tied)
+
+
+def distinct(causes: Iterable[Cause]) -> list[Cause]:
+    """Each cause once; none of every body or joint where one of them suffices, no part of a term where a number does."""
+    once: dict[frozenset[tuple[str, str]], Cause] = {}
+    for cause in causes:
+        parts = cause.parts if len(cause.parts) > 1 else (cause,)
+        once.setdefault(frozenset((part.place, str(part.explains)) for part in parts), cause)
+    kinds, fewest = {cause.kind for cause in once.values()}, dict[tuple[str, str], int]()
+    for cause in once.values():
+        key = cause.form, str(cause.explains)
+        fewest[key] = min(cause.owners, fewest.get(key, cause.owners))
+    return [
+        cause for cause in once.values()
+        if not (cause.form and cause.owners > fewest[cause.form, str(cause.explains)])
+        and not (cause.kind == "part" and kinds & {"number", "body"})
+    ]  # fmt: skip

@@ -18,7 +18,7 @@ from ..core.text import say
 from ..judge.agree import closest
 from ..robots.coordinates import Coordinates
 from .cause import TEMPLATE
-from .model import ROUNDED
+from .layout import ROUNDED
 
 STEP = 2e-3  # rad or m, or s along a motion of about one rad/s
 SAFETY = 8.0  # times the error or the noise that is estimated

@@ -20,11 +20,12 @@ from ..core.text import say
 from ..judge.agree import share_of
 from ..judge.entries import Entries
 from .cause import TEMPLATE, ranked
-from .fit import Search
-from .hypothesis import Hypothesis, option
-from .likelihood import cost
-from .model import ROUNDED, Equations, Values
-from .places import Place, factor, forces
+from .fit import Search, explaining
+from .hypothesis import Hypothesis, cost, factor, option
+from .kinds.numbers import forces
+from .layout import ROUNDED, Values
+from .model import Equations
+from .pairs import of_numbers
 
 SHARPER = 4.0  # times the tolerance: accelerations are rounded before Mbar is multiplied by them
 
@@ -54,14 +55,15 @@ class LeftOver:
         """What explains the force: all causes of the first rank that has one."""
         if not (np.isfinite(self.force).all() and np.isfinite(self.tolerance).all()):
             return ()
-        places = [*forces(self.tree, self.values.q, self.values.qd), *self.weights()]
         nothing = np.zeros((1, *self.force.shape))
-        search = Search(lambda changes: nothing, places, self.force, self.tolerance)
+        search = Search(lambda changes: nothing, self.force, self.tolerance)
         if np.abs(search.off).max() <= 1.0:
             return ()
-        causes = search.explained(self.options())
-        causes = causes or [fit.cause for fit in search.singles() if fit.explains]
-        causes = causes or [fit.cause for fit in search.pairs(("number",), ("number",)) if fit.explains]
+        options, places = list(self.options()), list(forces(self.tree, self.values.q, self.values.qd))
+        numbers = search.expanded([one for one in places if one.cause.kind == "number"])
+        fits = explaining(search.alone(search.expanded(options)))
+        fits = fits or explaining(search.alone(search.expanded([*places, *self.weights()])))
+        causes = [fit.cause for fit in fits or of_numbers(search, [numbers])]
         equations = Equations(self.tree, self.values.q, self.values.qd)
         return ranked(sorted(causes, key=lambda cause: cost(cause, equations)))
 
@@ -69,7 +71,7 @@ class LeftOver:
         """The causes in words; "" if there is none."""
         return say(Finding(TEMPLATE, "forces", {"list": self.causes})) if self.causes else ""
 
-    def weights(self) -> Iterator[Place]:
+    def weights(self) -> Iterator[Hypothesis]:
         """The factor of the gravity of each body."""
         equations = Equations(self.tree, self.values.q, self.values.qd)
         for body, added in zip(self.tree.body_names, equations.terms["gravity"]):
@@ -77,22 +79,24 @@ class LeftOver:
 
     def options(self) -> Iterator[Hypothesis]:
         """Each option, and the force that is left over with it."""
+        nothing = 0.0 * self.force
         terms = {"torque": ("tau", -self.tau), "bias": ("- h", self.values.bias)}
         terms |= {"damping": ("- D qd", self.damping), "springs": ("- k (q - rest)", self.springs)}
         factors = {"left out": -1.0, "of the other sign": -2.0, "twice": 1.0}
         for (name, (stated, term)), explains in product(terms.items(), factors):
             place = f"{name} in the acceleration"
             if term.any():
-                yield option(place, stated, explains, factors[explains] * term)
+                yield option(nothing, place, stated, explains, factors[explains] * term)
         if self.springs.any():
             slack = (
                 np.array(self.tree.stiffness)[self.of_speed]
                 * self.values.q[:, self.tree.coordinates.first_positions]
             )
             place = "springs in the acceleration"
-            yield option(place, "- k (q - rest)", "at rest at zero", slack - self.springs)
+            yield option(nothing, place, "- k (q - rest)", "at rest at zero", slack - self.springs)
         h, M = self.values.bias, self.values.mass_matrix
         for inside, force in {"(tau - D qd)": h, "tau": h + self.damping + self.springs}.items():
             solved = np.einsum("sij,sj->si", M, force) - force
             wrong = f"inv(M) {inside} - h: h is not multiplied by inv(M)"
-            yield option("how you solve for the acceleration", "inv(M) (tau - D qd - h)", wrong, solved)
+            place = "how you solve for the acceleration"
+            yield option(nothing, place, "inv(M) (tau - D qd - h)", wrong, solved)

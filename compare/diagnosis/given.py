@@ -1,15 +1,25 @@
 """Given values of Mbar and h with their parts, and tolerances of their own scale; where they differ."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
+from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy import ndarray
 
 from tmt import Tree
 
+from ..core.cause import Cause
+from ..robots.coordinates import Coordinates
+from ..robots.joint_map import Joint, JointMap, within_a_turn
 from .cause import Detail
-from .conventions import Convention
-from .model import MOST_SPEEDS, ROUNDED, Entry, Equations, Layout, Values, coefficients_of
+from .consistency import follows_from
+from .fit import Fitted
+from .hypothesis import OF_ZERO
+from .kinds.conventions import Convention
+from .layout import MOST_SPEEDS, ROUNDED, Entry, Layout, Values, coefficients_of
+from .model import Equations
 
 SUMMED = 8.0  # times the tolerance of an entry: of a sum of its values at several speeds
 MOST_POSITIONS = 6  # in a sentence
@@ -50,6 +60,14 @@ class Given:
         of_state[:, start : start + self.layout.nv] = speed
         return np.nanmax(np.abs(self.packed) / of_state, axis=0, initial=0.0) * of_state
 
+    @cached_property
+    def h_follows_from_M(self) -> bool:
+        """Whether the velocity terms are those of the given Mbar, by its derivatives."""
+        values = self.values
+        if self.mass_matrix is None or self.rest is None or self.equations.coordinates.has_balls:
+            return False
+        return follows_from(self.mass_matrix, values.q, values.qd, values.bias - self.rest)
+
     def in_the_model(self, convention: Convention) -> "Given":
         """The values as the model has them, if they are in a convention."""
         q, qd, qdd = convention.q, convention.qd, self.layout.qdd
@@ -89,3 +107,53 @@ class Given:
         if bias is None or nv > MOST_SPEEDS:
             return {}
         return coefficients_of(lambda speeds: np.stack([bias(speed + 0.0 * qd) for speed in speeds]), nv)
+
+
+# how joints are to be stated in the convention of a cause
+
+
+class Stated(NamedTuple):
+    """How the joints of given equations are stated."""
+
+    joints: JointMap
+    by: Literal["argument", "option"] = "argument"  # joints=[...] of assert_agrees, or --joints
+
+
+class Statements(NamedTuple):
+    """The statements of causes. stated: the joints as stated, which may be wrong; None: they cannot be."""
+
+    coordinates: Coordinates
+    stated: Stated | None
+
+    def causes(self, fits: Iterable[Fitted]) -> Iterator[Cause]:
+        """The fits as causes; of conventions and zeros of joints with the joints to state."""
+        for fit in fits:
+            cause, joints = fit.cause, fit.hypotheses[0].joints
+            if all(part.kind == OF_ZERO for part in cause.parts or (cause,)):
+                joints = self.with_zeros(fit)
+            yield from self.restated(cause, joints)
+
+    def with_zeros(self, fit: Fitted) -> JointMap:
+        """Joints with the zeros of a fit."""
+        changes = zip(fit.hypotheses, fit.changes)
+        zeros = {one.cause.place: one.value(change) - float(one.cause.stated) for one, change in changes}
+        joints, kinds = [], self.coordinates.all_kinds
+        for name, kind in zip(self.coordinates.names, kinds):
+            zero = within_a_turn(zeros.get(f"zero of {name}", 0.0), kind == "slide")
+            joints.append(Joint(name, zero=float(f"{zero:.12g}"), slides=kind == "slide"))
+        return JointMap(self.coordinates, joints)
+
+    def restated(self, cause: Cause, convention: JointMap | None) -> list[Cause]:
+        """A cause with how joints are to be stated in its convention; [] if that cannot be."""
+        if self.stated is None or convention is None:
+            return [cause]
+        wrong, by = self.stated
+        joints = convention if wrong.is_same else wrong.after(convention, self.coordinates)
+        if joints is None:
+            return []
+        if joints.is_same and not wrong.is_same and not cause.parts:
+            stated = ", ".join(map(str, wrong.joints))
+            part = Cause(rank=1, kind="order", place="joints", stated=stated, explains="those of the model")
+            cause = replace(cause, parts=(part,))
+        names = list(map(str, joints.joints))
+        return [replace(cause, joints=f"--joints={','.join(names)}" if by == "option" else f"joints={names}")]

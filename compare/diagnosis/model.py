@@ -5,7 +5,7 @@ broadcast with positions (states,), real or complex; the derivative by a number 
 imaginary change of 1e-100, exact to rounding.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
 from itertools import chain
@@ -19,9 +19,8 @@ from tmt.derivation import method
 from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import ZERO, Vector
 
-from ..judge.entries import Entries
-from ..judge.scale import EPS, FACTOR
 from ..robots.coordinates import Coordinates
+from .layout import Entry, Layout, coefficients_of
 
 FIELDS = ("offset", "axis", "com", "inertia", "mass", "gravity", "reference", "armature")
 OF_TERM = {  # T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' I w_conv and B' (omega x I omega) of h
@@ -29,13 +28,11 @@ OF_TERM = {  # T' m T and B' I B of Mbar; T' m g, T' m v_conv, B' I w_conv and B
     "rotation": "rotational inertia of {}",
     "gravity": "gravity of {}",
     "convective": "centripetal and Coriolis forces of {}",
-    "Euler": "moment I w_conv of {}",
+    "Euler": "moment I alpha at constant rates of {}",
     "gyroscopic": "gyroscopic moment omega x I omega of {}",
 }
-MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 WHOLE = 1e-12  # of components of axes from whole numbers
 TINY = 1e-100  # an imaginary change, whose square vanishes
-ROUNDED = FACTOR * EPS  # of the scale of an entry
 
 
 class Path(NamedTuple):
@@ -52,76 +49,7 @@ class Frame(NamedTuple):
     axes: ndarray  # as columns
 
 
-class Entry(NamedTuple):
-    """An entry of Mbar or h, or a coefficient of h, see `coefficients_of`."""
-
-    kind: str  # "M", "h", "gravity" or "velocity"
-    at: tuple[int, ...]  # the numbers of the speeds
-
-    def named(self, speeds: Sequence[str]) -> str:
-        """Its name: "M[hip][knee]", "h[hip]", "h[hip], gravity", "h[hip], coefficient of hip' knee'"."""
-        names = [speeds[i] for i in self.at]
-        if self.kind == "gravity":
-            return f"h[{names[0]}], gravity"
-        if self.kind == "velocity":
-            first, second = names[1:]
-            rates = f"{first}'^2" if first == second else f"{first}' {second}'"
-            return f"h[{names[0]}], coefficient of {rates}"
-        return self.kind + "".join(f"[{name}]" for name in names)
-
-
 Changes = Mapping[Path, ndarray]  # what is added to a number, (changes,)
-
-
-class Layout(NamedTuple):
-    """What stands in a row of values: Mbar by rows, then h, or its velocity terms and h at rest.
-
-    With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone.
-    """
-
-    nv: int
-    is_split: bool = False
-    is_symmetric: bool = True  # the lower triangle of Mbar by rows, else all of it
-    qdd: ndarray | None = None
-
-    @property
-    def places(self) -> tuple[ndarray, ndarray]:
-        """The rows and columns of the entries of Mbar."""
-        if self.qdd is not None:
-            return np.zeros(0, int), np.zeros(0, int)
-        if self.is_symmetric:
-            return np.tril_indices(self.nv)
-        i, j = np.indices((self.nv, self.nv))
-        return i.ravel(), j.ravel()
-
-    @property
-    def parts(self) -> dict[str, slice]:
-        """The entries of each part of the equations."""
-        n, nv = len(self.places[0]), self.nv
-        of_h = {"velocity terms": slice(n, n + nv), "gravity": slice(n + nv, n + 2 * nv)}
-        return {"M": slice(0, n)} | (of_h if self.is_split else {"h": slice(n, n + nv)})
-
-    @property
-    def in_M(self) -> slice:
-        return self.parts["M"]
-
-    @property
-    def in_h(self) -> slice:
-        """All entries of h."""
-        return slice(self.in_M.stop, None)
-
-    def packed(self, mass_matrix: ndarray, velocity_terms: ndarray, rest: ndarray) -> ndarray:
-        """Values (..., entries) of Mbar (..., nv, nv) and the two parts of h (..., nv)."""
-        if self.qdd is not None:  # of as many states as there are, or of all several times
-            qdd = np.resize(self.qdd, np.shape(velocity_terms)[-2:])
-            return np.einsum("...ij,...j->...i", mass_matrix, qdd) + velocity_terms + rest
-        i, j = self.places
-        of_h = [velocity_terms, rest] if self.is_split else [velocity_terms + rest]
-        return np.concatenate([np.asarray(mass_matrix)[..., i, j], *of_h], axis=-1)
-
-    def of_row(self, i: int) -> list[int]:
-        """The entries of a row of h."""
-        return [self.parts[name].start + i for name in list(self.parts)[1:]]
 
 
 class Equations:
@@ -272,58 +200,3 @@ def vectors(rows: Sequence[Sequence[Vector]], count: int) -> ndarray:
     return np.array([[[np.broadcast_to(x, count) for x in v] for v in row] for row in rows]).swapaxes(2, 3)
 
 
-def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:
-    """Mbar (..., nv, nv) and h (..., nv), (..., entries), by the layout without parts."""
-    return Layout(np.shape(bias)[-1]).packed(mass_matrix, bias, np.zeros_like(bias))
-
-
-class Values(NamedTuple):
-    """Mbar and h with their tolerances, in the model's joints; NaN where a quantity is not given."""
-
-    q: ndarray  # (states, nq)
-    qd: ndarray  # (states, nv)
-    mass_matrix: ndarray  # (states, nv, nv)
-    bias: ndarray  # (states, nv)
-    tolerances: tuple[ndarray, ndarray]  # of both
-
-    @classmethod
-    def of(
-        cls, tree: tmt.Tree, q: ndarray, qd: ndarray, mass_matrix: ndarray | None, bias: ndarray | None,
-        rounding: float = ROUNDED,
-    ) -> "Values":  # fmt: skip
-        """With the tolerances of judge.entries. None: not given; rounding: of the scale of an entry."""
-        scale, shape = Entries(tree, q, qd), (*qd.shape, qd.shape[1])
-        M = np.full(shape, np.nan) if mass_matrix is None else mass_matrix
-        h = np.full(qd.shape, np.nan) if bias is None else bias
-        return cls(q, qd, M, h, (rounding * np.broadcast_to(scale.mass_matrix, shape), rounding * scale.bias))
-
-    @property
-    def packed(self) -> ndarray:
-        """As `Equations` has them, (states, entries)."""
-        return packed(self.mass_matrix, self.bias)
-
-    @property
-    def packed_tolerance(self) -> ndarray:
-        return packed(*self.tolerances)
-
-    @property
-    def are_finite(self) -> bool:
-        return bool(np.isfinite(self.packed).all())
-
-
-def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, ndarray]:
-    """Coefficients of h_i, (states,) each: "gravity" (i,), and "velocity" (i, j, k) of qd_j qd_k, j <= k.
-
-    bias: speeds (n, nv) -> h (n, states, nv), of which the part that is even in the speeds is taken.
-    """
-    unit, even = np.eye(nv), {}
-    pairs = [(j, k) for j in range(nv) for k in range(j, nv)] if nv <= MOST_SPEEDS else []
-    speeds = [unit[j] + (j != k) * unit[k] for j, k in pairs]
-    rest, *values = bias(np.array([0.0 * unit[0], *speeds, *(-speed for speed in speeds)]))
-    for pair, forward, back in zip(pairs, values, values[len(pairs) :]):
-        even[pair] = (forward + back) / 2.0 - rest
-    mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
-    found = {Entry("gravity", (i,)): rest[:, i] for i in range(nv)}
-    for pair, values in (even | mixed).items():
-        found |= {Entry("velocity", (i, *pair)): values[:, i] for i in range(nv)}
-    return found

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
+from itertools import product
 from math import inf
 
 import numpy as np
@@ -12,48 +12,45 @@ from numpy import ndarray
 from tmt import Tree
 
 from ..core.cause import Cause
-from .angles import linearized, orders_of_rotation, other_angles, sums_of_angles
-from .cause import LEAST_STATES, Diagnosis, ranked, together
-from .consistency import follows_from
-from .conventions import Convention, all_conventions, values_in
-from .edits import edits
-from .fit import PROMISING, Fitted, OutOfTime, Search
-from .given import Bias, Given
-from .groups import inertial_numbers, several, vectors
-from .hypothesis import Hypothesis
-from .likelihood import NATURAL, cost, in_part
-from .model import Equations, Values
-from .places import OF_ZERO
-from .recursion import slips_of_recursion
-from .slips import slips_of_kinematics
-from .statements import Stated, Statements
-from .terms import all_places
-from .variants import lagrange, program_options
+from .cause import LEAST_STATES, Diagnosis, distinct, ranked, together
+from .fit import Family, Fitted, OutOfTime, Search, explaining
+from .given import Bias, Given, Stated, Statements
+from .hypothesis import NATURAL, OF_ZERO, Hypothesis, cost
+from .kinds.angles import linearized, orders_of_rotation, other_angles, sums_of_angles
+from .kinds.conventions import conventions
+from .kinds.edits import edits
+from .kinds.numbers import forces_in_bias, numbers
+from .kinds.recursion import slips_of_recursion
+from .kinds.slips import slips_of_kinematics
+from .kinds.terms import coefficients, squares_of_velocities, terms
+from .kinds.variants import lagrange, program_options
+from .layout import Values
+from .model import Equations
+from .pairs import of_numbers, of_slips
+from .regression import several
 
-FEW = 2  # states at which conventions are tried first
-TRIED = 3  # states at which other explanations are tried first
+# states at which hypotheses are tried first: at least so many, and values for those of two numbers
+FEW, ENOUGH = 3, 40
 LARGE = 7e7  # times the tolerance of 64 eps: 1e-6 of the scale
 NEAREST = 0.05  # of the difference: what leaves more is not near
-NEAR = 2  # conventions with which another cause is sought
+NEAR = 2  # conventions with which another cause is sought, and single changes of which the nearest is told
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
-# pairs of a slip and a number that are tried: by what they leave to first order
-SECOND_ORDER, MOST_NEAR = 0.1, 200
+IN_PART, CONVENTION_IN_PART = 0.12, 0.32  # costs of a slip, of a convention in some parts alone
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
     ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in {rest} alone",
     ("M", "velocity terms"): ", but not in {rest}", ("M", "gravity"): ", but not in the velocity terms of h",
 }  # fmt: skip
 
-
 Kind = Callable[[Equations], Iterator[Hypothesis]]
+FACTORS: tuple[Kind, ...] = (terms, squares_of_velocities, coefficients, forces_in_bias)
+COMPLETE: tuple[Kind, ...] = (program_options, edits, lagrange)
 SLIPS: tuple[Kind, ...] = (
-    orders_of_rotation,
-    slips_of_kinematics,
-    slips_of_recursion,
-    linearized,
-    sums_of_angles,
-)
-ALL_KINDS: tuple[Kind, ...] = (program_options, edits, lagrange, *SLIPS)
+    orders_of_rotation, slips_of_kinematics, slips_of_recursion, linearized, sums_of_angles,
+)  # fmt: skip
+# two of the first, or one of them and one of the others
+PAIRS: tuple[tuple[Kind, ...], ...] = ((numbers,), (numbers, terms, coefficients))
+FIRST: tuple[Kind, ...] = (program_options, conventions, numbers, *FACTORS, edits, lagrange)
 
 
 def diagnose(
@@ -62,9 +59,9 @@ def diagnose(
 ) -> Diagnosis:  # fmt: skip
     """What explains given values that differ from those of a tree's equations.
 
-    seconds: for the search of numbers, terms and pairs. bias: the given h at the same q and other speeds, and
-    mass_matrix: the given Mbar at other q, if there are functions. stated: how the joints were stated, which
-    may be wrong; None: they cannot be. qdd: accelerations, of which the given h are the forces Mbar qdd + h.
+    seconds: for the search. bias: the given h at the same q and other speeds, and mass_matrix: the given Mbar
+    at other q, if there are functions. stated: how the joints were stated, which may be wrong; None: they
+    cannot be. qdd: accelerations, of which the given h are the forces Mbar qdd + h.
     """
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
         given = Given(tree, values, bias, mass_matrix, qdd=qdd)
@@ -77,16 +74,21 @@ class Explanations:
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
         self.given, self.equations, self.seconds, self.end = given, given.equations, seconds, end
         self.statements = Statements(given.equations.coordinates, stated)
-        known = np.isfinite(given.packed).any(axis=0)
-        places = all_places(self.equations)
-        places = [place for place in places if place.column is None or place.column[:, known].any()]
-        self.search = Search(self.equations.values, places, given.packed, given.tolerance, end)
+        # a robot with springs has them in the forces that are compared
+        self.at_rest = "the forces at rest" if given.tree.has_springs else "gravity"
+        self.search = Search(self.equations.values, given.packed, given.tolerance, end)
+        known, parts = self.search.known, given.layout.parts
+        states = max(FEW, -(-ENOUGH // max(1, known.any(axis=0).sum())))
+        few = np.sort(np.argsort(-known.sum(axis=1), kind="stable")[:states])  # where most is given
+        self.at_few = self.equations.at(few)
+        self.few = Search(self.at_few.values, given.packed[few], self.search.tolerance[few], end)
         self.off = (np.abs(self.search.off) > 1.0).any(axis=0)
-        parts = given.layout.parts
-        self.known = [name for name, part in parts.items() if known[part].any()]
+        self.known = [name for name, part in parts.items() if known[:, part].any()]
         self.differing = [name for name, part in parts.items() if self.off[part].any()]
         self.is_finished = True
-        self.computed: dict[tuple[Kind, bool], list[Hypothesis]] = {}
+        self.families: dict[Kind, Family] = {}
+        self.listed: dict[Kind, list[Hypothesis]] = {}
+        self.near: list[Fitted] = []  # single changes that leave little at a few states
 
     def diagnosis(self) -> Diagnosis:
         if not self.off.any():
@@ -103,27 +105,28 @@ class Explanations:
         if len(np.unique(self.equations.q, axis=0)) < LEAST_STATES:
             return found._replace(too_few=len(self.equations.q))
         causes = next(filter(None, self.stages()), [])
+        seconds = None if self.is_finished else self.seconds
         if causes:
-            return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))))
-        whole = [fit for fit in self.all_singles if fit.is_possible and fit.left_over < NEAREST]
-        near = [fit for fit in whole if fit.places[0].kind != "whole"]
-        closest = min(near, key=lambda fit: fit.left_over, default=None)
-        return found._replace(
-            closest=closest.cause if closest else None,
-            details=self.given.details() if layout.qdd is None else (),
-            seconds=None if self.is_finished else self.seconds,
-        )
-
-    @property
-    def at_rest(self) -> str:
-        """The part of h at rest: a robot with springs has them in the forces that are compared."""
-        return "the forces at rest" if self.equations.tree.has_springs else "gravity"
+            return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))), seconds=seconds)
+        details = self.given.details() if layout.qdd is None else ()
+        closest = self.closest() if self.is_finished else None
+        return found._replace(closest=closest, details=details, seconds=seconds)
 
     def named(self, parts: Sequence[str]) -> tuple[str, ...]:
         return tuple(self.at_rest if part == "gravity" else part for part in parts)
 
     def cost(self, cause: Cause) -> float:
         return cost(cause, self.equations)
+
+    def closest(self) -> Cause | None:
+        """The single change that leaves least, if that is little."""
+        near = sorted(self.near, key=lambda fit: fit.left_over)
+        keys = [fit.hypotheses[0].key for fit in near if fit.hypotheses[0].cause.kind != "whole"][:NEAR]
+        every = [one for kind in FIRST if kind in self.families for one in self.hypotheses(kind)]
+        those = [one for one in every if one.key in keys]
+        fits = self.search.alone(self.search.expanded(those)) if those else []
+        closest = min(fits, key=lambda fit: fit.left_over, default=None)
+        return closest.cause if closest and closest.left_over < NEAREST and closest.is_possible else None
 
     # stages
 
@@ -132,8 +135,12 @@ class Explanations:
 
         One number with many digits is simpler than two causes.
         """
-        unusual: list[Cause] = []
-        for stage in (self.everything, self.slips, self.of_parts, self.angles, self.groups, self.two_causes):
+        unusual, said = list[Cause](), self.statements.causes
+        stages: tuple[Callable[[], Iterable[Cause]], ...] = (
+            lambda: said(self.explained(FIRST)), lambda: said(self.explained(SLIPS)), self.of_parts,
+            lambda: said(self.of_angles(self.search)), self.groups, self.two_causes,
+        )  # fmt: skip
+        for stage in stages:
             causes: list[Cause] = []
             try:
                 causes += stage()  # what was found before the end is kept
@@ -147,37 +154,9 @@ class Explanations:
                 break
         yield unusual
 
-    def everything(self) -> Iterator[Cause]:
-        """Options, conventions, single numbers and terms, and edits of several numbers."""
-        yield from self.search.explained(self.variants(program_options))
-        for convention, values in self.in_conventions(self.search):
-            for cause in self.search.explained([(convention.cause, values)]):
-                yield from self.statements.restated(cause, convention.joints)
-        yield from self.statements.causes(fit for fit in self.all_singles if fit.explains)
-        yield from self.explained(self.search, (edits, lagrange))
-
-    def slips(self) -> list[Cause]:
-        """Slips of positions, angular velocities and tensors, and of a recursion."""
-        return [cause for kind in SLIPS for cause in self.explained(self.search, (kind,))]
-
-    def explained(self, search: Search, kinds: Iterable[Kind]) -> list[Cause]:
-        """The causes of some kinds that leave nothing of what is searched: at a few states, then at all."""
-        causes: list[Cause] = []
-        few = search.at(self.tried)
-        for kind in kinds:
-            if near := {key_of(cause) for cause in few.explained(self.variants_at_few(kind))}:
-                causes += search.explained(pair for pair in self.variants(kind) if pair.key in near)
-        return causes
-
-    def angles(self) -> list[Cause]:
-        """Sines and cosines of a hinge, in an entry or a part."""
-        return self.search.explained(other_angles(self.equations, self.search))
-
     def groups(self) -> Iterator[Cause]:
         """The ten numbers of a body, the same number of all, the components of an offset or a CoM."""
-        yield from inertial_numbers(self.equations, self.search)
-        yield from several(self.search)
-        yield from vectors(self.search)
+        return several(self.equations, self.search.expanded(self.hypotheses(numbers)), self.search)
 
     def of_parts(self) -> list[Cause]:
         """Slips in some parts alone, in all that differ."""
@@ -187,9 +166,76 @@ class Explanations:
             causes += self.within(different, self.differing)
         return causes
 
+    def two_causes(self) -> Iterator[Cause]:
+        yield from self.beside_conventions()
+        for kinds in PAIRS:
+            fits = of_numbers(self.few, [self.family(kind) for kind in kinds])
+            every = {one.key: one for kind in kinds for one in self.hypotheses(kind)}
+            sets = [tuple(every[one.key] for one in fit.hypotheses) for fit in fits]
+            starts = np.array([fit.changes for fit in fits])
+            found = list(self.statements.causes(explaining(self.search.fitted(sets, starts)) if sets else ()))
+            yield from found
+            if any(self.cost(cause) < NATURAL for cause in found):
+                break
+        for open_kind, complete in {numbers: (*COMPLETE, *SLIPS), coefficients: (program_options,)}.items():
+            families = {kind: self.family(kind) for kind in complete}
+            for kind, one, other in of_slips(self.few, self.family(open_kind), families):
+                for slip, number in product(self.at_all(kind, [one]), self.at_all(open_kind, [other])):
+                    beside = self.search.beside(slip.added)
+                    for fit in explaining(beside.alone(beside.expanded([number]))):
+                        yield together([slip.cause, fit.cause], 0.0)
+
+    # the search
+
+    def hypotheses(self, kind: Kind) -> list[Hypothesis]:
+        """Those of a kind at all states, computed once."""
+        if kind not in self.listed:
+            self.listed[kind] = self.all_of(kind, self.equations)
+        return self.listed[kind]
+
+    def family(self, kind: Kind) -> Family:
+        """Those of a kind at a few states, computed once."""
+        if kind not in self.families:
+            self.families[kind] = self.few.expanded(self.all_of(kind, self.at_few))
+        return self.families[kind]
+
+    def all_of(self, kind: Kind, equations: Equations) -> list[Hypothesis]:
+        """The hypotheses of a kind that act, as far as there is time; options are always tried."""
+        found, known = [], self.search.known.any(axis=0)
+        for one in kind(equations):
+            if one.column is None or one.column[:, known].any():
+                found.append(one)
+            if kind is not program_options:
+                self.search.in_time()
+        return found
+
+    def at_all(self, kind: Kind, those: Iterable[Hypothesis]) -> list[Hypothesis]:
+        """Hypotheses of a few states at all."""
+        keys = {one.key for one in those}
+        return [one for one in self.hypotheses(kind) if one.key in keys]
+
+    def explained(self, kinds: Iterable[Kind], entries: ndarray | None = None) -> Iterator[Fitted]:
+        """What leaves nothing of some entries, or of all: at a few states, then at all."""
+        few, every = self.few, self.search
+        if entries is not None:
+            few, every = few.within(entries), every.within(entries)
+        for kind in kinds:
+            fits = few.alone(self.family(kind), entries is None)
+            near = [fit.hypotheses[0] for fit in fits if fit.ratio <= 1.0]
+            if entries is None:
+                self.near += (fit for fit in fits if fit.left_over < NEAREST and fit.hypotheses[0].is_open)
+            if near:
+                those = every.expanded(self.at_all(kind, near))
+                yield from explaining(every.alone(those, entries is None))
+
+    def of_angles(self, search: Search) -> list[Fitted]:
+        """Other sines and cosines."""
+        those = list(other_angles(self.equations, search))
+        return explaining(search.alone(search.expanded(those))) if those else []
+
     def independent(self, parts: Sequence[str]) -> list[str]:
         """The parts without velocity terms that follow from a given Mbar that differs."""
-        is_left_out = {"velocity terms", "M"} <= set(self.differing) and self.h_follows_from_M
+        is_left_out = {"velocity terms", "M"} <= set(self.differing) and self.given.h_follows_from_M
         return [name for name in parts if not (is_left_out and name == "velocity terms")]
 
     def entries_in(self, parts: Iterable[str]) -> ndarray:
@@ -203,161 +249,31 @@ class Explanations:
 
         said: the parts that are meant.
         """
-        search = self.search.within(self.entries_in(parts))
-        others = self.entries_in(set(self.known) - set(said))
+        entries = self.entries_in(parts)
+        search, others = self.search.within(entries), self.entries_in(set(self.known) - set(said))
         if not (np.abs(search.off) > 1.0).any():
             return []
         causes: list[Cause] = []
-
-        def add(found: list[Cause], moved: ndarray) -> None:
-            is_elsewhere = (np.abs(moved) > search.tolerance)[:, others].any()
+        for fit in [*self.explained((*FIRST, *SLIPS), entries), *self.of_angles(search)]:
+            (one,), (change,) = fit.hypotheses, fit.changes
+            moved = change * (search.expanded([one]).first[0] / one.size)
+            is_elsewhere = (np.abs(moved) > self.search.tolerance)[:, others].any()
             where = IN_PARTS.get(tuple(said), "").format(rest=self.at_rest) if is_elsewhere else ""
-            for cause in found:
-                more = in_part(cause) if where else 0.0
-                causes.append(replace(cause, place=cause.place + where, cost=cause.cost + more))
-
-        few = search.at(self.tried)
-        for kind in ALL_KINDS:
-            if near := {key_of(cause) for cause in few.explained(self.variants_at_few(kind))}:
-                for pair in (pair for pair in self.variants(kind) if pair.key in near):
-                    add(search.explained([pair]), pair[1] - search.right)
-        for pair in other_angles(self.equations, search):
-            add(search.explained([pair]), pair[1] - search.right)
-        for convention, values in self.in_conventions(search):
-            add(search.explained([(convention.cause, values)]), values - search.right)
-        for fit in (fit for fit in search.singles(is_thorough=False) if fit.explains):
-            add(self.statements.causes([fit]), search.change(fit))
+            is_convention = one.convention is not None or one.cause.kind == "order"
+            more = (CONVENTION_IN_PART if is_convention else IN_PART) * bool(where)
+            those = [fit.cause] if one.convention else self.statements.causes([fit])
+            causes += [replace(cause, place=cause.place + where, cost=cause.cost + more) for cause in those]
         return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
 
     def beside_conventions(self) -> Iterator[Cause]:
         """A convention and one more cause, in the model's own joints."""
-        for convention in self.near_conventions:
-            inner = Explanations(self.given.in_the_model(convention), self.end, None)
+        fits = self.few.alone(self.family(conventions))
+        near = sorted((fit for fit in fits if fit.left_over < PARTIAL), key=lambda fit: fit.left_over)[:NEAR]
+        for one in self.at_all(conventions, [fit.hypotheses[0] for fit in near]):
+            inner = Explanations(self.given.in_the_model(one.convention), self.end, None)
             if not inner.off.any():
                 continue
-            causes = inner.explained(inner.search, (program_options, edits, lagrange))
-            causes += [fit.cause for fit in inner.search.singles(is_thorough=False) if fit.explains]
+            causes = [fit.cause for fit in inner.explained((*COMPLETE, numbers, *FACTORS))]
             for cause in (cause for cause in causes if inner.cost(cause) < NATURAL):
-                both = together([convention.cause, cause], 0.0)
-                yield from self.statements.restated(both, convention.joints)
+                yield from self.statements.restated(together([one.cause, cause], 0.0), one.joints)
 
-    def two_causes(self) -> Iterator[Cause]:
-        yield from self.beside_conventions()
-        fits = self.search.pairs(("number", OF_ZERO), ("number", OF_ZERO, "term", "coefficient"))
-        yield from self.statements.causes(fit for fit in fits if fit.explains)
-        yield from self.with_slips()
-        if not any(fit.explains for fit in fits):
-            numbers = [fit for fit in fits if all(place.kind == "number" for place in fit.places)]
-            yield from self.statements.causes(fit for fit in self.search.thirds(numbers) if fit.explains)
-
-    def with_slips(self) -> Iterator[Cause]:
-        """An edit or a slip beside a number or a term; their changes are added."""
-        search = self.search.at(self.tried)
-        variants = [(kind, *pair) for kind in ALL_KINDS for pair in self.variants_at_few(kind)]
-        moved = np.stack([((values - search.right) * search.weight).ravel() for *_, values in variants])
-        left = search.off.ravel() - moved
-        squares, enough = np.einsum("vm,vm->v", left, left), (PROMISING * search.size) ** 2
-        columns = search.expansion[0].reshape(len(search.places), -1)
-        lengths = np.linalg.norm(columns, axis=1)
-        along = left @ (columns / np.where(lengths > 0.0, lengths, 1.0)[:, None]).T
-        acts = np.abs(moved).max(axis=1) > 1.0
-        may = np.array([place.kind != "whole" for place in search.places])
-        after = np.where(acts[:, None] & may, squares[:, None] - along**2, np.inf)
-        near = np.argwhere(after < enough + SECOND_ORDER * squares[:, None])
-        for v, k in near[np.argsort(after[tuple(near.T)])][:MOST_NEAR].tolist():
-            if search.best_change(k, left[v].reshape(search.off.shape))[0] > 1.0:
-                continue
-            kind, cause, _ = variants[v]
-            values = next(values for other, values in self.variants(kind) if key_of(other) == key_of(cause))
-            ratio, change = self.search.best_change(k, self.search.weighted(values))
-            if ratio <= 1.0 and search.places[k].is_possible(change):
-                yield together([cause, search.places[k].cause(change)], 0.0)
-
-    # what is computed once
-
-    @cached_property
-    def tried(self) -> ndarray:
-        """The states at which explanations are tried first: where most is given."""
-        return np.sort(np.argsort(-self.search.known.sum(axis=1), kind="stable")[:TRIED])
-
-    def variants(self, kind: Kind) -> list[Hypothesis]:
-        """The explanations of a kind, computed once."""
-        if (kind, False) not in self.computed:
-            self.computed[kind, False] = self.all_of(kind, self.equations)
-        return self.computed[kind, False]
-
-    def all_of(self, kind: Kind, equations: Equations) -> list[Hypothesis]:
-        """The explanations of a kind, as far as there is time; options are always tried."""
-        found = []
-        for pair in kind(equations):
-            found.append(pair)
-            if kind is not program_options:
-                self.search.in_time()
-        return found
-
-    def variants_at_few(self, kind: Kind) -> list[Hypothesis]:
-        """The same at a few states."""
-        if (kind, True) not in self.computed:
-            self.computed[kind, True] = self.all_of(kind, self.equations.at(self.tried))
-        return self.computed[kind, True]
-
-    @cached_property
-    def all_singles(self) -> list[Fitted]:
-        try:
-            return self.search.singles()
-        except OutOfTime:
-            self.is_finished = False
-            return []
-
-    @cached_property
-    def conventions(self) -> list[tuple[Convention, ndarray]]:
-        """The conventions, and the values in each at a few states."""
-        those = list(all_conventions(self.equations))
-        return list(zip(those, values_in(self.equations, [convention.first(FEW) for convention in those])))
-
-    def shares(self, search: Search) -> list[tuple[float, Convention]]:
-        """What each convention leaves at a few states, a share, and the convention."""
-        size = float(np.linalg.norm(search.off[:FEW])) or 1.0
-        left = [float(np.linalg.norm(search.weighted(values))) for _, values in self.conventions]
-        return [(norm / size, convention) for norm, (convention, _) in zip(left, self.conventions)]
-
-    def in_conventions(self, search: Search) -> Iterator[tuple[Convention, ndarray]]:
-        """The conventions that leave nothing at a few states, with the values at all."""
-        for convention in (convention for share, convention in self.shares(search) if share < 1e-3):
-            yield from ((convention, values) for values in values_in(self.equations, [convention]))
-
-    @property
-    def near_conventions(self) -> list[Convention]:
-        """The conventions that leave least, if they leave something."""
-        best = sorted(self.shares(self.search), key=lambda pair: pair[0])[:NEAR]
-        return [convention for share, convention in best if share < PARTIAL]
-
-    @property
-    def h_follows_from_M(self) -> bool:
-        """Whether the velocity terms are those of the given Mbar, by its derivatives."""
-        given, values = self.given, self.given.values
-        if given.mass_matrix is None or given.rest is None or self.equations.coordinates.has_balls:
-            return False
-        return follows_from(given.mass_matrix, values.q, values.qd, values.bias - given.rest)
-
-
-def key_of(cause: Cause) -> tuple[str, str]:
-    """What tells the explanations of a kind apart."""
-    return cause.place, str(cause.explains)
-
-
-def distinct(causes: Iterable[Cause]) -> list[Cause]:
-    """Each cause once; none of every body or joint where one of them suffices, no part of a term where a number does."""
-    once: dict[frozenset[tuple[str, str]], Cause] = {}
-    for cause in causes:
-        parts = cause.parts if len(cause.parts) > 1 else (cause,)
-        once.setdefault(frozenset((part.place, str(part.explains)) for part in parts), cause)
-    kinds, fewest = {cause.kind for cause in once.values()}, dict[tuple[str, str], int]()
-    for cause in once.values():
-        key = cause.form, str(cause.explains)
-        fewest[key] = min(cause.owners, fewest.get(key, cause.owners))
-    return [
-        cause for cause in once.values()
-        if not (cause.form and cause.owners > fewest[cause.form, str(cause.explains)])
-        and not (cause.kind == "part" and kinds & {"number", "body"})
-    ]  # fmt: skip

@@ -17,7 +17,8 @@ from ..core.rows import Row, column
 from ..core.text import block
 from ..diagnosis import STATES_ASKED, Stated, Values
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.model import ROUNDED, Equations, packed
+from ..diagnosis.layout import ROUNDED, packed
+from ..diagnosis.model import Equations
 from ..engines import Dynamics
 from ..engines.mujoco.reading import tree_with_sites
 from ..engines.own import OwnDynamics

@@ -9,12 +9,12 @@ from scipy.spatial.transform import Rotation
 
 import tmt
 from compare.diagnosis import Stated, Values, diagnose
-from compare.diagnosis.conventions import all_conventions
-from compare.diagnosis.groups import is_round
-from compare.diagnosis.likelihood import NATURAL, cost
-from compare.diagnosis.model import Equations, Layout
-from compare.diagnosis.recursion import SLIPS, evaluated, slips_of_recursion
-from compare.diagnosis.slips import slips_of_kinematics
+from compare.diagnosis.hypothesis import NATURAL, cost, is_round
+from compare.diagnosis.kinds.conventions import conventions
+from compare.diagnosis.kinds.recursion import SLIPS, evaluated, slips_of_recursion
+from compare.diagnosis.kinds.slips import slips_of_kinematics
+from compare.diagnosis.layout import Layout
+from compare.diagnosis.model import Equations
 from compare.engines.mujoco import reading, tree_with_sites
 from compare.robots.coordinates import Coordinates
 from compare.robots.joint_map import joint_map
@@ -49,8 +49,8 @@ def parts(tree):
 
 def convention_of(tree, place):
     """The first of a place or with this explanation."""
-    every = all_conventions(Equations(tree, *states(tree)))
-    return next(one for one in every if place in (one.cause.place, one.cause.explains))
+    every = conventions(Equations(tree, *states(tree)))
+    return next(one.convention for one in every if place in (one.cause.place, one.cause.explains))
 
 
 def places(diagnosis):
@@ -206,8 +206,8 @@ def test_every_slip_of_the_recursion_changes_something_in_some_model():
     changed = set()
     for tree in (ARM, ROW, READ["mixed"]):
         equations = Equations(tree, *states(tree, 3), Layout(len(tree.axis), True, False))
-        for cause, values in slips_of_recursion(equations):
-            if (np.abs(values - equations.right) > 1e-9).any():
+        for cause, column, *_ in slips_of_recursion(equations):
+            if (np.abs(column) > 1e-9).any():
                 changed.add((cause.form, cause.explains))
     assert changed >= {(slip.place, slip.wrong) for slip in SLIPS}
 
@@ -231,13 +231,39 @@ def test_every_slip_of_the_recursion_changes_something_in_some_model():
 ])  # fmt: skip
 def test_a_slip_of_the_derivation_is_named(kind, place, explains):
     equations = Equations(BENT_ARM, *states(BENT_ARM), Layout(3, True, False))
-    given = next(
-        values for cause, values in kind(equations) if (cause.place, cause.explains) == (place, explains)
-    )
-    assert np.abs(given - equations.right).max() > 1e-6
+    added = next(one.column for one in kind(equations) if one.key == (place, explains))
+    given = equations.right + added
+    assert np.abs(added).max() > 1e-6
     M, velocity_terms, rest = given[:, :9].reshape(-1, 3, 3), given[:, 9:12], given[:, 12:]
     found = of_parts(BENT_ARM, M, velocity_terms, rest)
     assert (place, explains) in {(cause.place, cause.explains) for cause in found.causes}
+
+
+def test_a_slip_and_a_number_are_named_together():
+    tensor = TENSOR + ARM.mass[1] * (np.dot(ARM.com[1], ARM.com[1]) * np.eye(3) - np.outer(ARM.com[1], ARM.com[1]))
+    found = of_parts(ARM, *parts(replace(ARM, inertia=(ARM.inertia[0], tensor.tolist()), mass=(1.7, 1.5))))
+    pairs = [{part.place for part in cause.parts} for cause in found.causes]
+    assert {"mass of upper arm", "inertia of forearm"} in pairs
+
+
+def test_a_velocity_with_the_part_of_another_body():
+    (q, qd), (M, velocity_terms, rest) = states(BENT_ARM), parts(BENT_ARM)
+    T, (a, _), m = tmt.jacobians(BENT_ARM, q)[0], tmt.convective_terms(BENT_ARM, q, qd), BENT_ARM.mass[1]
+    right, wrong = T[:, 1], T[:, 1].copy()
+    wrong[:, :, 1] = T[:, 0, :, 1]
+    M = M + m * (np.swapaxes(wrong, 1, 2) @ wrong - np.swapaxes(right, 1, 2) @ right)
+    velocity_terms = velocity_terms + m * np.einsum("sci,sc->si", wrong - right, a[:, 1])
+    rest = rest - m * np.einsum("sci,c->si", wrong - right, np.array(BENT_ARM.gravity))
+    place, explains = first(of_parts(BENT_ARM, M, velocity_terms, rest))
+    assert place == "velocity of the CoM of forearm" and "beta" in explains and "upper arm" in explains
+
+
+def test_one_of_both_blocks_of_M_transposed():
+    M, velocity_terms, rest = parts(STONE)
+    M = M.copy()
+    M[:, :3, 3:] = np.swapaxes(M[:, :3, 3:], 1, 2)
+    found = first(of_parts(STONE, M, velocity_terms, rest))
+    assert found == ("M[stone x, stone y, stone z][stone turn]", "transposed")
 
 
 def test_a_cause_in_parts_of_the_equations_alone():

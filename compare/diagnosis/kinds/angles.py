@@ -8,17 +8,15 @@ import numpy as np
 
 from tmt.derivation import method
 
-from ..core.words import listed
-from .fit import Search
-from .hypothesis import Hypothesis, hypothesis
-from .model import TINY, Equations
-from .terms import unit_columns
+from ...core.words import listed
+from ..fit import Search
+from ..hypothesis import Hypothesis, slip
+from ..model import TINY, Equations
+from .terms import coefficients, terms, unit_columns
 
-Functions = tuple[
-    dict[str, np.ndarray], list[tuple[str, str]]
-]  # functions by their names, (states,), and pairs
 Parallel = tuple[str, np.ndarray, np.ndarray]  # a name, a column (states, entries) and its factors (states,)
-OF_FACTORS = "coefficient", "term"  # kinds of places
+OF_FACTORS = "coefficient", "term"  # kinds
+ANGLE, FACTOR, ORDER, CONSTANT = 0.45, 0.5, 0.25, 1.05  # costs; a constant is rather a number that nobody writes
 ORDERED = " in the angular velocity", " in the positions"  # where alone an order may be another
 MOST_HINGES = 4  # of which products of sines and cosines are tried
 CLOSE = 1e-6  # of a coefficient, before the values are compared
@@ -45,16 +43,15 @@ def linearized(equations: Equations) -> Iterator[Hypothesis]:
         sets[listed([*sets])] = [i for i, _ in joints]
     for name, those in sets.items():
         place = f"sine and cosine of {name}"
-        yield hypothesis(
-            2, "angle", place, "", "linearized, sin a = a and cos a = 1", first_order(equations.q, those)
-        )
+        values = first_order(equations.q, those)
+        yield slip(equations.right, place, "linearized, sin a = a and cos a = 1", values, ANGLE, "angle")
     if "ball" not in tree.kind:
         zero, unit = np.tile(tree.zero, (len(equations.q), 1)), 1j * TINY * np.eye(equations.nv)
         still = Equations(tree, zero, equations.qd)
         slopes = [Equations(tree, zero + step, equations.qd).parts[2].imag / TINY for step in unit]
         rest = still.parts[2] + np.einsum("jsi,sj->si", slopes, equations.q - zero)
         values = layout.packed(still.parts[0], 0.0 * rest, rest)
-        yield hypothesis(2, "angle", "equations", "", "linearized about the zero position", values)
+        yield slip(equations.right, "equations", "linearized about the zero position", values, ANGLE, "angle")
 
 
 def sums_of_angles(equations: Equations) -> Iterator[Hypothesis]:
@@ -66,9 +63,8 @@ def sums_of_angles(equations: Equations) -> Iterator[Hypothesis]:
             q = equations.q.copy()
             q[:, k] += sign * (q[:, of_other] - tree.reference[list(tree.joint_names).index(other)])
             values = Equations(tree, q, equations.qd, layout).right
-            yield hypothesis(
-                2, "angle", f"angle of {name}", "", f"{what} that of {other}, the speeds as they are", values
-            )
+            explains = f"{what} that of {other}, the speeds as they are"
+            yield slip(equations.right, f"angle of {name}", explains, values, ANGLE, "angle")
 
 
 def orders_of_rotation(equations: Equations) -> Iterator[Hypothesis]:
@@ -101,100 +97,86 @@ def orders_of_rotation(equations: Equations) -> Iterator[Hypothesis]:
             names = listed([tree.joint_names[i] for i in order])
             for where, bodies in parts.items():
                 values = equations.layout.packed(*equations.summed(bodies, tree.gravity, tree.armature))
-                yield hypothesis(2, "order", f"order of the rotations{where}", "", names, values)
+                yield slip(equations.right, f"order of the rotations{where}", names, values, ORDER, "order")
 
 
-def functions_of(equations: Equations, hinges: dict[str, np.ndarray]) -> Functions:
-    """Sines and cosines of hinges and of their sums, their squares, and products of those of several hinges.
+def functions_of(equations: Equations) -> list[dict[str, np.ndarray]]:
+    """Products of sines and cosines of hinges, and those of sums of their angles, (states,), by how they are said.
 
-    And these times the lengths of slides; with the pairs that are taken for each other, the wrong one first.
+    One table, and for each slide those times its length and its square.
     """
-    values = {"0": 0.0 * equations.q[:, 0], "1": 0.0 * equations.q[:, 0] + 1.0}
-    angles, pairs = sums_of(hinges), []
-    for name, angle in angles.items():
-        sine, cosine = f"sin({name})", f"cos({name})"
-        values |= {sine: np.sin(angle), f"{sine}^2": np.sin(angle) ** 2}
-        values |= {cosine: np.cos(angle), f"{cosine}^2": np.cos(angle) ** 2}
-        pairs += [(sine, "0"), (cosine, "0"), ("1", sine), ("1", cosine), (sine, cosine)]
-        pairs += [(sine, f"{sine}^2"), (cosine, f"{cosine}^2"), (f"{sine}^2", f"{cosine}^2")]
-    for first, second in combinations(angles, 2):
-        pairs += [(f"{function}({first})", f"{function}({second})") for function in ("sin", "cos")]
-    tables = [factors_of(name) for name in hinges] if len(hinges) <= MOST_HINGES else []
-    for factors in product(*tables):
-        name = named(factors)
-        values.setdefault(name, np.prod([values[factor] for factor in name.split(" ")], axis=0))
-        for k, factor in enumerate(factors):
-            pairs += [(named((*factors[:k], other, *factors[k + 1 :])), name) for other in tables[k][factor]]
-    every, all_pairs = dict(values), list(pairs)
-    for name, joint in equations.joints.items():
-        for power, called in {1: name, 2: f"{name}^2"}.items() if joint.kind == "slide" else ():
-            length = equations.q[:, joint.q.start] ** power
-            every |= {f"{called} {function}": length * column for function, column in values.items()}
-            times = {function: f"{called} {function}" if function != "0" else "0" for function in values}
-            all_pairs += [(times[wrong], times[right]) for wrong, right in pairs if wrong in times]
-    return every, [(wrong, right) for wrong, right in all_pairs if wrong in every]
+    joints, one, angles = list(zip(equations.joints.items(), equations.tree.reference)), np.ones(len(equations.q)), []
+    for (name, at), zero in joints:
+        if at.kind == "hinge":
+            angles.append((name, equations.q[:, at.q.start] - zero))
+    powers = []
+    for name, angle in angles if len(angles) <= MOST_HINGES else ():
+        sine, cosine = np.sin(angle), np.cos(angle)
+        of_hinge = {"": one, f"sin({name})": sine, f"cos({name})": cosine, f"sin({name}) cos({name})": sine * cosine}
+        powers.append(of_hinge | {f"sin({name})^2": sine**2, f"cos({name})^2": cosine**2})
+    table = {"1": one}
+    for factors in product(*(of_hinge.items() for of_hinge in powers)):
+        said = " ".join(name for name, _ in factors if name) or "1"
+        table[said] = np.prod([values for _, values in factors], axis=0) * one
+    for count in (1, 2, 3) if len(angles) <= MOST_HINGES else (1, 2):
+        for (first, *others), signs in product(combinations(angles, count), product("+-", repeat=count - 1)):
+            name, angle = first
+            for sign, (other, values) in zip(signs, others):
+                name, angle = f"{name} {sign} {other}", angle + float(f"{sign}1") * values
+            for function, values in {"sin": np.sin(angle), "cos": np.cos(angle)}.items():
+                table |= {f"{function}({name})": values, f"{function}({name})^2": values**2}
+    tables = [table] if angles else []
+    for (name, at), _ in joints if angles else ():
+        for power, said in {1: name, 2: f"{name}^2"}.items() if at.kind == "slide" else ():
+            length = equations.q[:, at.q.start] ** power
+            tables.append({f"{said} {function}".removesuffix(" 1"): length * x for function, x in table.items()})
+    return tables
 
 
-def sums_of(hinges: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The angles of hinges, and sums and differences of two or three of them."""
-    angles = dict(hinges)
-    for count in (2, 3) if len(hinges) <= MOST_HINGES else (2,):
-        for (first, *others), signs in product(combinations(hinges, count), product("+-", repeat=count - 1)):
-            name, angle = first, hinges[first]
-            for sign, other in zip(signs, others):
-                name, angle = f"{name} {sign} {other}", angle + float(f"{sign}1") * hinges[other]
-            angles[name] = angle
-    return angles
+def instead_of(found: np.ndarray, table: dict[str, np.ndarray]) -> Iterator[tuple[str, np.ndarray]]:
+    """How a change (states,) is said, and its values: a function added or left out, and one instead of another.
 
-
-def named(factors: Iterable[str]) -> str:
-    return " ".join(filter(None, factors)) or "1"
-
-
-def factors_of(hinge: str) -> dict[str, tuple[str, ...]]:
-    """What a product may have of a hinge, and what is taken for it."""
-    sine, cosine = f"sin({hinge})", f"cos({hinge})"
-    return {
-        "": (), sine: (cosine, ""), cosine: (sine, ""),
-        f"{sine} {cosine}": (f"{sine}^2", f"{cosine}^2", sine, cosine),
-        f"{sine}^2": (f"{cosine}^2", sine, ""), f"{cosine}^2": (f"{sine}^2", cosine, ""),
-    }  # fmt: skip
+    Of several of these, which are the same by an identity, the shortest.
+    """
+    names, values = list(table), np.array([*table.values()])
+    alone, pairs = list[tuple[int, str, np.ndarray]](), list[tuple[int, str, np.ndarray]]()
+    for k, right in enumerate([np.zeros_like(found), *values]):
+        changes = values - right
+        sizes = changes @ found / np.fmax((changes**2).sum(axis=1), 1e-300)
+        left = np.abs(sizes[:, None] * changes - found).max(axis=1)
+        for j in np.flatnonzero((left <= CLOSE * np.abs(sizes)) & (sizes > 0.0 if k else True)).tolist():
+            size = f"{abs(sizes[j]):.6g}"
+            said = f"{size} {names[j]} {'added' if sizes[j] > 0.0 else 'left out'}"
+            if k:
+                said = f"{size} {names[j]} instead of {size} {names[k - 1]}"
+            said = said.replace(" 1 ", " ").removesuffix(" 1")
+            (pairs if k else alone).append((len(said), said, sizes[j] * changes[j]))
+    for likely in (alone, pairs):
+        least = min((length for length, *_ in likely), default=0)
+        yield from ((said, change) for length, said, change in likely if length == least)
 
 
 def other_angles(equations: Equations, search: Search) -> Iterator[Hypothesis]:
     """Terms of an entry or a coefficient with another sine or cosine: left out, added, one for the other."""
-    joints = zip(equations.joints.items(), equations.tree.reference)
-    hinges = {name: equations.q[:, at.q.start] - zero for (name, at), zero in joints if at.kind == "hinge"}
-    added = list(parallel(search, unit_columns(equations).items()))
-    places = [place for place in search.places if place.kind in OF_FACTORS]
-    places.sort(key=lambda place: OF_FACTORS.index(place.kind))
-    columns = [(place.name, place.column) for place in places if place.column is not None]
-    multiplied = list(parallel(search, columns))
-    if not hinges or not (added or multiplied):
+    tables = functions_of(equations)
+    if not tables:
         return
-    functions, pairs = functions_of(equations, hinges)
-    changes = np.array([functions[wrong] - functions[right] for wrong, right in pairs])
-    squares = (changes**2).sum(axis=1)
-    for place, column, found in added:
-        sizes = changes @ found / squares
-        left = np.abs(sizes[:, None] * changes - found).max(axis=1)
-        for k in np.flatnonzero(left <= CLOSE * np.abs(sizes)).tolist():
-            size = float(sizes[k])
-            yours, other = pairs[k] if size > 0.0 else pairs[k][::-1]
-            terms = {name: f"{abs(size):.6g} {name}".removesuffix(" 1") for name in (yours, other)}
-            said = f"{terms[yours]} instead of {terms[other]}"
-            said = f"{terms[other]} left out" if yours == "0" else said
-            said = f"{terms[yours]} added" if other == "0" else said
-            yield hypothesis(
-                2, "angle", place, "", said, search.right + (size * changes[k])[:, None] * column
-            )
-    for (place, column, _), name in product(multiplied, hinges):
+    for place, column, found in parallel(search, unit_columns(equations).items()):
+        for table in tables:
+            for said, change in instead_of(found, table):
+                values, cost = search.right + change[:, None] * column, ANGLE if np.ptp(change) > 0.0 else CONSTANT
+                yield slip(equations.right, place, said, values, cost, "angle")
+    factors = [*coefficients(equations), *terms(equations)]
+    columns = [(one.cause.place, one.added) for one in factors if one.cause.kind in OF_FACTORS]
+    hinges = [name for name, kind in zip(equations.joints, equations.tree.kind) if kind == "hinge"]
+    for (place, column, _), name in product(parallel(search, columns), hinges):
         for yours, other in permutations(("1", f"sin({name})", f"cos({name})"), 2):
-            change = functions[yours] / functions[other] - 1.0
+            change = tables[0][yours] / tables[0][other] - 1.0
             said = f"{yours} for {other}"
             said = f"{other} left out" if yours == "1" else said
             said = f"{yours} too many" if other == "1" else said
-            yield hypothesis(2, "factor", place, "", said, search.right + change[:, None] * column)
+            values = search.right + change[:, None] * column
+            yield slip(equations.right, place, said, values, FACTOR, "factor")
 
 
 def parallel(search: Search, columns: Iterable[tuple[str, np.ndarray]]) -> Iterator[Parallel]:

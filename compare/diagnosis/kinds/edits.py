@@ -1,9 +1,9 @@
 """Numbers of a model exchanged, negated, left out or in another unit: several that one slip changes together.
 
-Each kind is a function in KINDS. It yields the place, what it explains, and the Tree's fields that differ.
+Each kind is a function in KINDS. It yields edits: the place, what it explains, and the Tree's fields that differ.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import combinations, permutations, product
 from typing import Any
@@ -11,13 +11,11 @@ from typing import Any
 import numpy as np
 from numpy import ndarray
 
-import tmt
-
-from ..core.words import listed
-from ..robots.coordinates import point_inertia
-from .hypothesis import Hypothesis, hypothesis
-from .model import Changes, Equations, Frame, Path
-from .places import EVERY_BODY, XYZ, sets_of_bodies, sets_of_joints
+from ...core.words import listed
+from ...robots.coordinates import point_inertia
+from ..hypothesis import Hypothesis, slip
+from ..model import Changes, Equations, Path
+from .numbers import XYZ, Owners, sets_of_bodies, sets_of_joints
 
 UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
     "lengths": ((1e3, 1e2, 1e-3, 1e-2, 1.0 / 0.0254, 0.0254), ("offset", "com")),
@@ -27,32 +25,35 @@ UNITS = {  # factors of units that are taken for others, and the fields of a tre
 ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == order[k] for k in range(3)))
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
+BODY, NUMBERS = 0.12, 0.2  # costs: of a body left out, of other edits
 BLOCK = 64  # edits that are evaluated together
 EQUAL = 1e-12  # of a moment of inertia: two that are equal except for rounding
-Edit = tuple[
-    Any, ...
-]  # the place, what it explains, the fields that differ; the owner of the place, of how many
+# the place, what it explains, the fields that differ; the owner of the place, of how many
+Edit = tuple[Any, ...]
+Kind = Callable[[Equations], Iterator[Edit]]
 Way = Callable[[ndarray], ndarray]
-Ways = dict[tuple[str, str], Way]  # of a field, by the place and what it explains
 
 
 def edits(equations: Equations) -> Iterator[Hypothesis]:
     """The values with each edit that changes a number."""
     stated = equations.stated
-    chosen: dict[tuple[tuple[Path, str], ...], tuple[Edit, dict[Path, float]]] = {}
-    for edit in (edit for kind in KINDS for edit in kind(equations)):
-        moved: dict[Path, float] = {}
-        for name, field in edit[2].items():
-            moved |= {Path(name, at): x for at, x in np.ndenumerate(field - stated[name]) if x}
-        if moved:
-            chosen.setdefault(tuple((path, f"{x:.12g}") for path, x in moved.items()), (edit, moved))
-    kinds, every = {name: "body" for name, *_ in absent(equations)}, list(chosen.values())
+    chosen: dict[tuple[tuple[Path, str], ...], tuple[float, Edit, dict[Path, float]]] = {}
+    for of_kind in KINDS:
+        cost = BODY if of_kind is absent else NUMBERS
+        for edit in of_kind(equations):
+            moved: dict[Path, float] = {}
+            for name, field in edit[2].items():
+                moved |= {Path(name, at): x for at, x in np.ndenumerate(field - stated[name]) if x}
+            if moved:
+                chosen.setdefault(tuple((path, f"{x:.12g}") for path, x in moved.items()), (cost, edit, moved))
+    every = list(chosen.values())
     for start in range(0, len(every), BLOCK):
         block = every[start : start + BLOCK]
-        paths = dict.fromkeys(path for _, moved in block for path in moved)
-        rows: Changes = {path: np.array([moved.get(path, 0.0) for _, moved in block]) for path in paths}
-        for ((place, explains, _, *owner), _), values in zip(block, equations.values(rows)):
-            yield hypothesis(2, kinds.get(place, "numbers"), place, "", explains, values, *owner)
+        paths = dict.fromkeys(path for *_, moved in block for path in moved)
+        rows: Changes = {path: np.array([moved.get(path, 0.0) for *_, moved in block]) for path in paths}
+        for (cost, (place, explains, _, *owner), _), values in zip(block, equations.values(rows)):
+            kind = "body" if cost == BODY else "numbers"
+            yield slip(equations.right, place, explains, values, cost, kind, 2, "", *owner)
 
 
 def in_order(order: tuple[int, ...]) -> str:
@@ -62,33 +63,29 @@ def in_order(order: tuple[int, ...]) -> str:
     return f"in the order {', '.join(XYZ[k] for k in order)}"
 
 
-def ways_of_tensors() -> Ways:
+def of_tensors(equations: Equations) -> Iterator[Edit]:
     """Axes of a tensor permuted, or those of its moments or products alone; products negated or left out."""
-    ways: Ways = {}
+    ways: dict[tuple[str, str], Way] = {}
+
+    def permuted(I: ndarray, order: tuple[int, ...], entries: ndarray | bool = True) -> ndarray:
+        return np.where(entries, I[np.ix_(order, order)], I)
+
     for order in ORDERS:
         axes = f"axes {in_order(order)}"
-        ways[f"inertia of {{}}, {axes}", ""] = permuted(order)
-        ways[f"moments of inertia of {{}}, {axes}", ""] = permuted(order, products=False)
+        ways[f"inertia of {{}}, {axes}", ""] = partial(permuted, order=order)
+        ways[f"moments of inertia of {{}}, {axes}", ""] = partial(permuted, order=order, entries=DIAGONAL)
     for order in EXCHANGES:
         fixed = next(k for k in range(3) if order[k] == k)
-        products = ["".join(sorted(XYZ[fixed] + XYZ[k])) for k in range(3) if k != fixed]
-        ways[f"products of inertia {listed(products)} of {{}}", "exchanged"] = permuted(order, moments=False)
-    return ways | {
+        names = ["".join(sorted(XYZ[fixed] + XYZ[k])) for k in range(3) if k != fixed]
+        place = f"products of inertia {listed(names)} of {{}}"
+        ways[place, "exchanged"] = partial(permuted, order=order, entries=~DIAGONAL)
+    ways |= {
         ("axial and transverse inertia of {}", "exchanged"): axial_for_transverse,
         ("products of inertia of {}", "negated"): lambda I: np.where(DIAGONAL, I, -I),
         ("products of inertia of {}", "left out"): lambda I: np.where(DIAGONAL, I, 0.0),
         ("inertia of {}", "left out, a point mass"): lambda I: 0.0 * I,
     }
-
-
-def permuted(order: Sequence[int], moments: bool = True, products: bool = True) -> Way:
-    """A tensor with its moments or products those of axes in another order."""
-
-    def change(I: ndarray) -> ndarray:
-        new = I[np.ix_(order, order)]
-        return np.where(DIAGONAL, new if moments else I, new if products else I)
-
-    return change
+    yield from of_rows(equations, "inertia", sets_of_bodies(equations.tree), ways)
 
 
 def axial_for_transverse(I: ndarray) -> ndarray:
@@ -101,48 +98,42 @@ def axial_for_transverse(I: ndarray) -> ndarray:
     return I
 
 
-def ways_of_vectors(name: str) -> Ways:
-    """At zero, of the other sign, with two coordinates exchanged."""
-    ways: Ways = {(name, "zero"): lambda r: 0.0 * r, (name, "of the other sign"): lambda r: -r}
-    return ways | {
-        (name, f"coordinates {in_order(order)}"): partial(np.take, indices=order) for order in EXCHANGES
-    }
+def of_vectors(equations: Equations) -> Iterator[Edit]:
+    """CoMs and offsets at zero, of the other sign, with two coordinates exchanged."""
+    tree = equations.tree
+    of_fields = {"com": ("CoM of {}", sets_of_bodies(tree)), "offset": ("offset of {}", sets_of_joints(tree))}
+    for field, (place, sets) in of_fields.items():
+        ways: dict[tuple[str, str], Way] = {
+            (place, "zero"): lambda r: 0.0 * r, (place, "of the other sign"): lambda r: -r,
+        }  # fmt: skip
+        for order in EXCHANGES:
+            ways[place, f"coordinates {in_order(order)}"] = partial(np.take, indices=order)
+        yield from of_rows(equations, field, sets, ways)
 
 
-def of_rows(equations: Equations) -> Iterator[Edit]:
-    """The tensors, CoMs and offsets of bodies and joints, one, those that are alike, or all."""
-    bodies, joints = sets_of_bodies(equations.tree), sets_of_joints(equations.tree)
-    frames = [equations.frame_of(b) for b in range(len(equations.tree.mass))]
-    of_parents = [Frame(np.zeros(3), equations.axes_at(parent)) for parent in equations.tree.parent]
-    kinds = (
-        ("inertia", bodies, ways_of_tensors(), frames), ("com", bodies, ways_of_vectors("CoM of {}"), frames),
-        ("offset", joints, ways_of_vectors("offset of {}"), of_parents),
-    )  # fmt: skip
-    for field, sets, ways, axes in kinds:
-        for name, rows in sets.items():
-            for (place, explains), new in ways.items():
-                after = equations.stated[field].copy()
-                for row in rows:
-                    after[row] = in_frame(new, axes[row])(after[row])
-                yield place, explains, {field: after}, name, len(rows)
-
-
-def in_frame(new: Way, frame: Frame) -> Way:
-    """The change of a vector or tensor whose components are those in a frame."""
-    origin, R = frame
-
-    def change(row: ndarray) -> ndarray:
-        if row.ndim == 2:
-            return R @ new(R.T @ row @ R) @ R.T
-        return R @ new(R.T @ (row - origin)) + origin
-
-    return change
+def of_rows(
+    equations: Equations, field: str, sets: list[Owners], ways: dict[tuple[str, str], Way]
+) -> Iterator[Edit]:
+    """A field of bodies or joints changed in one, those that are alike, or all; in the frames of the file."""
+    tree, stated = equations.tree, equations.stated[field]
+    for (name, rows), ((place, explains), way) in product(sets, ways.items()):
+        after = stated.copy()
+        for row in rows:
+            if field == "offset":
+                R, origin = equations.axes_at(tree.parent[row]), np.zeros(3)
+            else:
+                origin, R = equations.frame_of(row)
+            if field == "inertia":
+                after[row] = R @ way(R.T @ stated[row] @ R) @ R.T
+            else:
+                after[row] = R @ way(R.T @ (stated[row] - origin)) + origin
+        yield place, explains, {field: after}, name, len(rows)
 
 
 def parallel_axes(equations: Equations) -> Iterator[Edit]:
     """Slips of I about another point, I + m (c'c 1 - c c'): counted again, left out, a part of it, a sign."""
     stated = equations.stated
-    for name, bodies in sets_of_bodies(equations.tree).items():
+    for name, bodies in sets_of_bodies(equations.tree):
         ways: dict[str, ndarray] = {}
         for b in bodies:
             origin, R = equations.frame_of(b)
@@ -160,65 +151,51 @@ def parallel_axes(equations: Equations) -> Iterator[Edit]:
                 after[b] = after[b] + R @ change @ R.T
         for explains, after in ways.items():
             yield "inertia of {}", explains, {"inertia": after}, name, len(bodies)
-
-
-def about_one_axis(equations: Equations) -> Iterator[Edit]:
-    """The moment of inertia about one axis left out of every body, as of thin rods."""
-    for k, axis in enumerate(XYZ if len(equations.tree.mass) > 1 else ""):
-        after = equations.stated["inertia"].copy()
+    for k, axis in enumerate(XYZ if len(stated["mass"]) > 1 else ""):  # as of thin rods
+        after = stated["inertia"].copy()
         for b, I in enumerate(after):
             along = equations.frame_of(b).axes[:, k]
             after[b] = I - along @ I @ along * np.outer(along, along)
-        yield f"inertia {axis}{axis} of {EVERY_BODY}", "left out", {"inertia": after}
+        yield f"inertia {axis}{axis} of every body", "left out", {"inertia": after}
 
 
 def absent(equations: Equations) -> Iterator[Edit]:
     """A body, or all that a joint carries, left out."""
-    tree, stated = equations.tree, equations.stated
-    carried = {name: bodies for name, bodies in sets_of_bodies(tree).items() if name != EVERY_BODY}
-    for i in range(len(tree.parent)):
-        bodies = [b for b in range(len(tree.mass)) if tree.moves(b)[i]]
-        if 1 < len(bodies) < len(tree.mass):
-            carried.setdefault(listed([tree.body_names[b] for b in bodies]), bodies)
-    for name, bodies in carried.items():
+    tree, stated, count = equations.tree, equations.stated, len(equations.tree.mass)
+    carried = [[b] for b in range(count)]
+    carried += [[b for b in range(count) if tree.moves(b)[i]] for i in range(len(tree.parent))]
+    for bodies in (those for those in carried if len(those) < max(count, 2)):
         fields = {field: stated[field].copy() for field in ("mass", "inertia")}
         for field in fields.values():
             field[bodies] = 0.0
-        yield name, "left out", fields
-
-
-def concentrated(equations: Equations) -> Iterator[Edit]:
-    """The mass of all bodies at the CoM of one of them."""
-    mass = equations.stated["mass"]
-    for name, at in zip(equations.tree.body_names, np.eye(len(mass))):
-        yield "masses of every body", f"at the CoM of {name}", {"mass": mass.sum() * at}
+        yield listed([tree.body_names[b] for b in bodies]), "left out", fields
 
 
 def swapped(equations: Equations) -> Iterator[Edit]:
-    """Numbers of two bodies or joints exchanged; the length and the CoM of a link exchanged."""
+    """Numbers of two bodies or joints exchanged; the length and the CoM of a link; all mass at one CoM."""
     tree, stated = equations.tree, equations.stated
 
-    def exchanged(field: str, i: int, j: int) -> dict[str, ndarray]:
-        after = stated[field].copy()
-        after[[i, j]] = after[[j, i]]
-        return {field: after}
+    def exchanged(i: int, j: int, *names: str) -> dict[str, ndarray]:
+        order = np.arange(len(stated[names[0]]))
+        order[[i, j]] = j, i
+        return {name: stated[name][order] for name in names}
 
-    for a, b in combinations(range(len(tree.mass)), 2):
-        both = listed([tree.body_names[a], tree.body_names[b]])
-        together: dict[str, ndarray] = {}
-        for field, name in {"mass": "masses", "com": "CoMs", "inertia": "inertias"}.items():
-            together |= exchanged(field, a, b)
-            yield f"{name} of {both}", "exchanged", exchanged(field, a, b)
-        yield f"masses, CoMs and inertias of {both}", "exchanged", together
+    fields: dict[str, tuple[str, ...]] = {"masses": ("mass",), "CoMs": ("com",), "inertias": ("inertia",)}
+    fields |= {"masses, CoMs and inertias": ("mass", "com", "inertia")}
+    for (a, b), (name, those) in product(combinations(range(len(tree.mass)), 2), fields.items()):
+        place = f"{name} of {listed([tree.body_names[a], tree.body_names[b]])}"
+        yield place, "exchanged", exchanged(a, b, *those)
     for i, j in combinations(np.flatnonzero(stated["armature"]).tolist(), 2):
         names = equations.speeds[i], equations.speeds[j]
-        yield f"armatures of {listed(names)}", "exchanged", exchanged("armature", i, j)
+        yield f"armatures of {listed(names)}", "exchanged", exchanged(i, j, "armature")
     for (b, i), (j, parent) in product(enumerate(tree.body_joint), enumerate(tree.parent)):
         if parent == i >= 0:
             offset, com = stated["offset"].copy(), stated["com"].copy()
             offset[j], com[b] = stated["com"][b], stated["offset"][j]
             place = f"CoM of {tree.body_names[b]} and offset of {tree.joint_names[j]}"
             yield place, "exchanged", {"offset": offset, "com": com}
+    for name, at in zip(tree.body_names, np.eye(len(tree.mass))):
+        yield "masses of every body", f"at the CoM of {name}", {"mass": sum(tree.mass) * at}
 
 
 def scaled(equations: Equations) -> Iterator[Edit]:
@@ -258,23 +235,18 @@ def turns(equations: Equations) -> Iterator[Edit]:
     }
     fixed = [before[i].T @ equations.axes_at(i) for i in range(len(before))]
     turned = [i for i, turn in enumerate(fixed) if not np.allclose(turn, np.eye(3))]
-    sets = {tree.joint_names[i]: [i] for i in turned} | ({"every joint": turned} if len(turned) > 1 else {})
-    for (name, joints), (explains, way) in product(sets.items(), ways.items()):
+    sets = [(tree.joint_names[i], [i]) for i in turned] + [("every joint", turned)] * (len(turned) > 1)
+    for (name, joints), (explains, way) in product(sets, ways.items()):
         after = {field: equations.stated[field].copy() for field in ("axis", "offset", "com", "inertia")}
-        for i in joints[::-1]:  # from the tips
-            turn(tree, i, after, before[i] @ way(fixed[i]) @ fixed[i].T @ before[i].T)
+        for i in joints[::-1]:  # from the tips, with all that each carries, where all joints are at zero
+            by = before[i] @ way(fixed[i]) @ fixed[i].T @ before[i].T
+            carried = [k for k in range(len(tree.parent)) if i in tree.path(k)]
+            speeds = [v for k in carried for v in np.arange(len(tree.axis))[tree.coordinates.joints[k].qd]]
+            bodies = [b for b, k in enumerate(tree.body_joint) if k in carried]
+            for field, those in {"axis": speeds, "offset": carried[1:], "com": bodies}.items():
+                after[field][those] = after[field][those] @ by.T
+            after["inertia"][bodies] = by @ after["inertia"][bodies] @ by.T
         yield f"fixed turn at {name} (euler, quat or rpy)", explains, after
-
-
-def turn(tree: tmt.Tree, joint: int, fields: dict[str, ndarray], by: ndarray) -> None:
-    """Turn all that a joint carries, where all joints are at zero."""
-    carried = [k for k in range(len(tree.parent)) if joint in tree.path(k)]
-    bodies = [b for b, k in enumerate(tree.body_joint) if k in carried]
-    speeds = [v for k in carried for v in np.arange(len(tree.axis))[tree.coordinates.joints[k].qd].tolist()]
-    rows: dict[str, list[int]] = {"axis": speeds, "offset": carried[1:], "com": bodies}
-    for field, those in rows.items():
-        fields[field][those] = fields[field][those] @ by.T
-    fields["inertia"][bodies] = by @ fields["inertia"][bodies] @ by.T
 
 
 def in_other_order(turn: ndarray) -> ndarray:
@@ -293,6 +265,4 @@ def angles_of(turn: ndarray) -> ndarray:
     return np.asarray(Rotation.from_matrix(turn).as_euler("xyz"))
 
 
-KINDS: tuple[Callable[[Equations], Iterator[Edit]], ...] = (
-    absent, concentrated, of_rows, parallel_axes, about_one_axis, swapped, scaled, axes, turns,
-)  # fmt: skip
+KINDS: tuple[Kind, ...] = (absent, of_tensors, of_vectors, parallel_axes, swapped, scaled, axes, turns)

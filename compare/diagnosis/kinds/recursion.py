@@ -15,10 +15,10 @@ from numpy import ndarray
 import tmt
 from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
 
+from ..hypothesis import Hypothesis, slip
+from ..model import Equations
 from .conventions import matrices
-from .hypothesis import Hypothesis, slip
-from .model import Equations
-from .places import sets_of_bodies, sets_of_joints
+from .numbers import sets_of_bodies, sets_of_joints
 
 
 class Slip(NamedTuple):
@@ -38,7 +38,6 @@ SLIPS = (
     Slip("absolute", "rotation of {}", "not combined with those of the joints that carry it"),
     Slip("axis", "axis of {}", "not turned to the inertial frame"),
     Slip("axis before", "axis of {}", "not turned by the joint before"),
-    Slip("com", "CoM of {}", "not turned to the inertial frame", "body"),
     Slip("com before", "CoM of {}", "not turned by its own joint", "body"),
     Slip("alpha", "convective angular acceleration omega x axis qd of {}", "left out"),
     Slip("minus alpha", "convective angular acceleration omega x axis qd of {}", "of the other sign"),
@@ -46,9 +45,6 @@ SLIPS = (
     Slip("centripetal", "centripetal acceleration omega x (omega x c) of the CoM of {}", "left out", "body"),
     Slip("own motion", "acceleration of the offset of {}", "with the motion of the body that it carries"),
     Slip("a", "acceleration passed on to {}", "not turned to its axes"),
-    Slip("base", "acceleration passed on to {}", "left out"),
-    Slip("relative", "angular velocity of {} in the accelerations", "relative to the body before, not to the world"),
-    Slip("carried back", "angular velocity passed on to {}", "turned with R for R'"),
     Slip("both back", "angular velocity and acceleration passed on to {}", "turned with R for R'"),
     Slip("offset for CoM", "acceleration of the CoM of {}", "with the offset of the next joint for its CoM", "body"),
     Slip("first omega", "omega x I omega of {}", "with the angular velocity of the first body", "body"),
@@ -56,7 +52,6 @@ SLIPS = (
     Slip("CoM", "moment c x F of the force at the CoM of {}", "left out", "body"),
     Slip("minus CoM", "moment c x F of the force at the CoM of {}", "of the other sign", "body"),
     Slip("lever", "moment c x F of the force at the CoM of {}", "o x F, with the offset of its joint for its CoM", "body"),
-    Slip("com for offset", "lever of the force passed on by {}", "the CoM of the body before instead of the offset"),
     Slip("moment", "moment of the force passed on by {}", "left out"),
     Slip("minus moment", "moment of the force passed on by {}", "of the other sign"),
     Slip("n", "moment passed on by {}", "left out"),
@@ -76,7 +71,6 @@ class Frame(NamedTuple):
     omega: ndarray
     alpha: ndarray
     a: ndarray  # of the origin
-    passed: ndarray  # omega as its children take it
     slides: bool = False
 
 
@@ -102,21 +96,13 @@ class Recursion:
         self, tree: tmt.Tree, q: ndarray, qd: ndarray, qdd: ndarray, gravity: ndarray, slip: str = "",
         at: ndarray | None = None,
     ):  # fmt: skip
-        self.tree, self.q, self.qd, self.qdd, self.slip, self.at, self.rows = (
-            tree,
-            q,
-            qd,
-            qdd,
-            slip,
-            at,
-            len(q),
-        )
+        self.tree, self.q, self.qd, self.qdd = tree, q, qd, qdd
+        self.slip, self.at, self.rows = slip, at, len(q)
         self.joints, zero = tree.coordinates.joints, np.zeros((len(q), 3))
         self.identity = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-        self.world = Frame(self.identity, self.identity, zero, [], zero, zero, -gravity, zero)
+        self.world = Frame(self.identity, self.identity, zero, [], zero, zero, -gravity)
         self.frames: list[Frame] = []
-        for i in range(len(tree.parent)):
-            self.frames.append(self.frame(i))
+        self.frames += map(self.frame, range(len(tree.parent)))
 
     def step(self, name: str, index: int, right: ndarray, wrong: Wrong | None = None) -> ndarray:
         """A step's values: wrong ones, by default zero, in the rows with this slip at a joint or body."""
@@ -132,13 +118,13 @@ class Recursion:
         """The frame of a joint, outward."""
         step, joint, parent, columns = self.step, self.joints[i], self.before(i), list(self.q.T)
         offset = [np.broadcast_to(x, self.rows) for x in origin_in_parent(self.tree, i, columns)]
-        arm, omega = rotated(parent.turn, np.stack(offset, axis=-1)), parent.omega
+        arm = rotated(parent.turn, np.stack(offset, axis=-1))
         local = [np.broadcast_to(axis, arm.shape) for axis in np.array(self.tree.axis[joint.qd])]
         rates, forced = self.qd[:, joint.qd], self.qdd[:, joint.qd]
         if joint.kind == "slide":
             axis = step("axis", i, rotated(parent.turn, local[0]), lambda: local[0])
-            a = parent.a + self.carried(i, arm, omega, parent.alpha) + axis * forced
-            a = a + 2.0 * np.cross(omega, axis * rates)
+            a = parent.a + self.carried(i, arm, parent.omega, parent.alpha) + axis * forced
+            a = a + 2.0 * np.cross(parent.omega, axis * rates)
             return parent._replace(own=self.identity, arm=arm, axes=[axis], a=a, slides=True)
         own = matrices(turn_in_parent(self.tree, i, columns), self.rows)
         turn = parent.turn @ step("transposed", i, own, lambda: backward(own))
@@ -152,18 +138,15 @@ class Recursion:
         ]
         spin = np.einsum("ksc,sk->sc", axes, rates)
         back = turn @ own @ backward(parent.turn)
-        passed = step("carried back", i, parent.passed, lambda: rotated(back, parent.passed))
-        passed = step("both back", i, passed, lambda: rotated(back, parent.passed))
+        omega = step("both back", i, parent.omega, lambda: rotated(back, parent.omega))
         turning = step("both back", i, parent.alpha, lambda: rotated(back, parent.alpha))
-        convective = step("alpha", i, np.cross(passed, spin))
+        convective = step("alpha", i, np.cross(omega, spin))
         convective = step("minus alpha", i, convective, lambda: -convective)
         alpha = turning + convective + np.einsum("ksc,sk->sc", axes, forced)
-        moved = self.carried(i, arm, omega, parent.alpha)
-        moved = step("own motion", i, moved, lambda: self.carried(i, arm, omega + spin, alpha))
-        a = step("a", i, parent.a, lambda: rotated(turn @ backward(parent.turn), parent.a))
-        a = moved + step("base", i, a)
-        used = step("relative", i, passed + spin, lambda: spin)
-        return Frame(turn, own, arm, axes, used, alpha, a, passed + spin)
+        moved = self.carried(i, arm, parent.omega, parent.alpha)
+        moved = step("own motion", i, moved, lambda: self.carried(i, arm, parent.omega + spin, alpha))
+        a = moved + step("a", i, parent.a, lambda: rotated(turn @ backward(parent.turn), parent.a))
+        return Frame(turn, own, arm, axes, omega + spin, alpha, a)
 
     def carried(self, i: int, arm: ndarray, omega: ndarray, alpha: ndarray) -> ndarray:
         """The acceleration of the end of an arm from that of its beginning."""
@@ -174,7 +157,7 @@ class Recursion:
         step, tree, joint = self.step, self.tree, self.tree.body_joint[b]
         frame, first, mass, I = self.frames[joint], self.frames[0], tree.mass[b], np.array(tree.inertia[b])
         com = np.broadcast_to(np.array(tree.com[b]), (self.rows, 3))
-        c = step("com", b, rotated(frame.turn, com), lambda: com)
+        c = rotated(frame.turn, com)
         c = step("com before", b, c, lambda: rotated(frame.turn @ backward(frame.own), com))
         I, omega, alpha = frame.turn @ I @ backward(frame.turn), frame.omega, frame.alpha
         following = [k for k, parent in enumerate(tree.parent) if parent == joint]
@@ -191,12 +174,6 @@ class Recursion:
         moment = step("CoM", b, np.cross(lever, F))
         moment = step("minus CoM", b, moment, lambda: -moment)
         return F, rotated(I, alpha) + gyroscopic + moment
-
-    def com_of(self, joint: int) -> ndarray:
-        """From a joint to the CoM of its body."""
-        coms = (com for com, at in zip(self.tree.com, self.tree.body_joint) if at == joint)
-        com = np.array(next(coms, (0.0, 0.0, 0.0)))
-        return rotated(self.frames[joint].turn, np.broadcast_to(com, (self.rows, 3)))
 
     def forces(self) -> ndarray:
         """Of the joints, (rows, nv), inward."""
@@ -220,8 +197,7 @@ class Recursion:
             force = step("force", i, F[i], partial(rotated, to_parent, F[i]))
             turned = parent.turn @ backward(frame.own) @ backward(frame.turn)
             force = step("force turned back", i, force, partial(rotated, turned, F[i]))
-            lever = np.cross(step("com for offset", i, frame.arm, partial(self.com_of, joint)), force)
-            lever = step("moment", i, lever)
+            lever = step("moment", i, np.cross(frame.arm, force))
             F[joint] += force
             N[joint] += step("n", i, N[i]) + step("minus moment", i, lever, partial(np.negative, lever))
         return tau + np.array(tree.armature or [0.0] * len(tree.axis)) * self.qdd
@@ -233,12 +209,12 @@ def slips_of_recursion(equations: Equations) -> Iterator[Hypothesis]:
     places = {"joint": sets_of_joints(tree), "body": sets_of_bodies(tree)}
     for record in SLIPS:
         those = places[record.at]
-        at = np.zeros((1 + max(map(max, those.values())), len(those)), bool)
-        for k, numbers in enumerate(those.values()):
+        at = np.zeros((1 + max(max(numbers) for _, numbers in those), len(those)), bool)
+        for k, (_, numbers) in enumerate(those):
             at[numbers, k] = True
         values = evaluated(equations, record.step, at)
-        for (name, numbers), of_place in zip(those.items(), values):
-            yield slip(record.place, "", record.wrong, of_place, name, len(numbers))
+        for (name, numbers), of_place in zip(those, values):
+            yield slip(equations.right, record.place, record.wrong, of_place, owner=name, owners=len(numbers))
 
 
 def evaluated(equations: Equations, slip: str, at: ndarray) -> ndarray:

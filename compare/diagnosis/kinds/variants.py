@@ -1,14 +1,15 @@
 """Explanations without a number to fit: options of a file or a program, slips of derivatives."""
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
 from tmt import literal
 
-from .hypothesis import Hypothesis, hypothesis, option, slip
-from .model import TINY, Equations, Path
+from ..hypothesis import Hypothesis, option, slip
+from ..model import TINY, Equations, Path
+from .terms import speeds_of_joints
 
 OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, and the factors of both
     ("gradient of the kinetic energy in h", "left out"): (1.0, 0.0),
@@ -19,6 +20,7 @@ OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, an
     ("Mdot qd in h", "halved, and no gradient of the kinetic energy"): (0.5, 0.0),
     ("C(q, qd) in h", "transposed, C' qd for C qd"): (0.0, -1.0),
 }  # fmt: skip
+OF_ONE = 0.36  # cost of a slip in the derivative of one entry
 OF_SLOPES = {"left out": 0.0, "of the other sign": -1.0, "halved": 0.5, "twice": 2.0}
 
 
@@ -38,23 +40,33 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
         sprung = rest + literal.spring_torque(tree, q)
         of_h.append(("springs k (q - rest)", "not in h", "in h", moving, sprung))
     for place, stated, explains, of_speeds, of_gravity in of_h:
-        yield option(place, stated, explains, equations.with_bias(of_speeds, of_gravity))
+        yield option(equations.right, place, stated, explains, equations.with_bias(of_speeds, of_gravity))
     if q.shape == qd.shape:
         orders = {"exchanged, bias(qd, q)": exchanged, "in turn, q1, qd1, q2, qd2, ...": in_turn}
         for explains, order in orders.items():
             h, still = (Equations(tree, *order(q, speeds)).h for speeds in (qd, 0.0 * qd))
             values = equations.with_bias(h - still, still)
-            yield option("arguments of bias", "bias(q, qd)", explains, values)
+            yield option(equations.right, "arguments of bias", "bias(q, qd)", explains, values)
     triangles = {"off": M - M * np.eye(equations.nv)}
     if not equations.layout.is_symmetric:
         triangles |= {"above": np.triu(M, 1), "below": np.tril(M, -1)}
     for where, change in triangles.items():
         for explains, factor in OF_SLOPES.items():
             values = equations.layout.packed(M + (factor - 1.0) * change, moving, rest)
-            yield option(f"entries of M {where} the diagonal", "there", explains, values)
+            yield option(equations.right, f"entries of M {where} the diagonal", "there", explains, values)
+    for (first, rows), (second, columns) in combinations(speeds_of_joints(tree).items(), 2):
+        if len(rows) == len(columns) > 1:
+            above, below = np.ix_(range(len(q)), rows, columns), np.ix_(range(len(q)), columns, rows)
+            upper, lower = f"M[{first}][{second}]", f"M[{second}][{first}]"
+            for place, blocks in {upper: [above], lower: [below], f"{upper} and {lower}": [above, below]}.items():
+                turned = M.copy()
+                for at in blocks:
+                    turned[at] = np.swapaxes(M[at], 1, 2)
+                values = equations.layout.packed(turned, moving, rest)
+                yield option(equations.right, place, "there", "transposed", values)
     if any(tree.armature):
         rotors = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
-        yield option("armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])
+        yield option(equations.right, "armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])
 
 
 def exchanged(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -77,14 +89,14 @@ def lagrange(equations: Equations) -> Iterator[Hypothesis]:
     gradient = Mdot_qd - velocity_terms
     for (name, explains), (of_Mdot, of_gradient) in OF_ENERGY.items():
         values = equations.with_bias(of_Mdot * Mdot_qd - of_gradient * gradient, rest)
-        yield slip(name, "Mdot qd - d(qd' Mbar qd / 2)/dq", explains, values)
+        yield slip(equations.right, name, explains, values)
     speeds = equations.speeds
     for i, (explains, factor) in product(range(equations.nv), OF_SLOPES.items()):
         added = np.zeros_like(gradient)
         added[:, i] = (1.0 - factor) * gradient[:, i]
         if equations.nv > 1 and added.any():
             place = f"gradient of the kinetic energy in h[{speeds[i]}]"
-            yield slip(place, "once", explains, equations.with_bias(velocity_terms + added, rest))
+            yield slip(equations.right, place, explains, equations.with_bias(velocity_terms + added, rest))
     entries = [(i, j) for i in range(equations.nv) for j in range(i + 1)]
     for (i, j), k in product(entries, range(equations.nv)):
         alone = np.zeros_like(slopes)
@@ -93,4 +105,4 @@ def lagrange(equations: Equations) -> Iterator[Hypothesis]:
         for explains, factor in OF_SLOPES.items() if added.any() else ():
             values = equations.with_bias(velocity_terms + (factor - 1.0) * added, rest)
             place = f"dM[{speeds[i]}][{speeds[j]}]/d {speeds[k]} in h"
-            yield hypothesis(2, "derivative", place, "once", explains, values)
+            yield slip(equations.right, place, explains, values, OF_ONE, "derivative")

@@ -22,7 +22,7 @@ from numpy import ndarray
 
 from tmt.derivation import method
 
-from .model import TINY, Equations, vectors
+from ..model import TINY, Equations, vectors
 
 SAME = 1e-12  # of the largest: two ways that give the same
 ALTERNATES = {  # the angle of a hinge from its zero that is taken instead, and its derivative
@@ -50,14 +50,14 @@ class Segment(NamedTuple):
 
 
 class Changed(NamedTuple):
-    """A slip in one body: what is added to J and B (nv, rows, 3), and its tensor (rows, 3, 3); None: it is right."""
+    """A slip in one body: what is added to J and B (nv, rows, 3), and to its tensor (rows, 3, 3)."""
 
     place: str
     explains: str
     body: int
-    J: ndarray | None = None
-    B: ndarray | None = None
-    inertia: ndarray | None = None
+    J: ndarray | float = 0.0
+    B: ndarray | float = 0.0
+    inertia: ndarray | float = 0.0
     of_body: bool = True  # whether {} in its place is the body
 
 
@@ -92,112 +92,90 @@ class Kinematics:
             self.motions[joint, other] = Motion(axes, origins, np.moveaxis(turns, 3, 1))
         return self.motions[joint, other]
 
-    def speeds_of(self, joints: Iterable[int]) -> list[int]:
-        chosen = set(joints)
-        return [v for v, joint in enumerate(self.joint_of) if joint in chosen]
-
     def turning(self, joint: int) -> list[int]:
         """The hinges and balls that turn what a joint carries."""
         return [i for i in self.tree.path(joint)[::-1] if self.tree.kind[i] != "slide"] if joint >= 0 else []
 
+    def hinges(self, joint: int) -> list[int]:
+        return [i for i in self.turning(joint) if self.tree.kind[i] == "hinge"]
+
     def segments(self, b: int, joint: int = -1, other: str = "") -> list[Segment]:
         """The segments of the CoM of a body; with another angle of a hinge."""
-        tree, found = self.tree, []
-        motion, factor = self.motion(joint, other), ALTERNATES[other][1]
-        for i in tree.path(tree.body_joint[b])[::-1] if tree.body_joint[b] >= 0 else ():
-            parent, at = tree.parent[i], tree.coordinates.joints[i]
+        tree, of_body, found = self.tree, self.tree.body_joint[b], list[Segment]()
+        motion = self.motion(joint, other)
+        for i in tree.path(of_body)[::-1] if of_body >= 0 else ():
+            parent, at, name = tree.parent[i], tree.coordinates.joints[i], tree.joint_names[i]
             carrying = self.turning(parent)
             if parent >= 0 and np.any(tree.offset[i]):
                 arm = motion.turns[parent] @ np.array(tree.offset[i])
-                jacobian = self.swung(motion, arm, carrying, joint, factor)
-                found.append(Segment(f"offset of {tree.joint_names[i]}", jacobian, carrying))
+                found.append(Segment(f"offset of {name}", self.swung(arm, carrying, joint, other), carrying))
             if at.kind == "slide":
-                v = at.qd.start
-                length = self.q[:, at.q.start] - tree.reference[i]
-                jacobian = self.swung(motion, motion.axes[v] * length[:, None], carrying, joint, factor)
-                jacobian[v] = motion.axes[v]
-                name = tree.joint_names[i]
-                if found and parent >= 0 and tree.kind[parent] == "slide" and found[-1].slides:
+                length = self.q[:, at.q.start, None] - tree.reference[i]
+                jacobian = self.swung(motion.axes[at.qd.start] * length, carrying, joint, other)
+                jacobian[at.qd.start] = motion.axes[at.qd.start]
+                if found and tree.kind[parent] == "slide" and found[-1].slides:
                     before = found.pop()
                     name, jacobian = f"{before.name}, {name}", before.jacobian + jacobian
                 found.append(Segment(name, jacobian, carrying, slides=True))
-        arm, carrying = (
-            motion.turns[tree.body_joint[b]] @ np.array(tree.com[b]),
-            self.turning(tree.body_joint[b]),
-        )
-        jacobian = self.swung(motion, arm, carrying, joint, factor)
+        arm, carrying = motion.turns[of_body] @ np.array(tree.com[b]), self.turning(of_body)
+        jacobian = self.swung(arm, carrying, joint, other)
         return [*found, Segment(f"CoM of {tree.body_names[b]}", jacobian, carrying, True)]
 
-    def swung(self, motion: Motion, arm: ndarray, hinges: list[int], joint: int, factor: float) -> ndarray:
+    def swung(self, arm: ndarray, hinges: list[int], joint: int, other: str) -> ndarray:
         """The Jacobian of an arm that hinges turn."""
-        jacobian = np.zeros((self.nv, len(self.q), 3), complex)
-        for v in self.speeds_of(hinges):
-            jacobian[v] = np.cross(motion.axes[v], arm) * (factor if self.joint_of[v] == joint else 1.0)
+        jacobian, axes = np.zeros((self.nv, len(self.q), 3), complex), self.motion(joint, other).axes
+        for v, i in enumerate(self.joint_of):
+            if i in hinges:
+                jacobian[v] = np.cross(axes[v], arm) * (ALTERNATES[other][1] if i == joint else 1.0)
         return jacobian
 
     def angular(self, b: int, joint: int = -1, other: str = "") -> ndarray:
         """B of a body, in its axes; with another angle of a hinge."""
-        motion, B = self.motion(joint, other), np.zeros((self.nv, len(self.q), 3), complex)
-        for v in self.speeds_of(self.turning(self.tree.body_joint[b])):
-            B[v] = self.in_body(b, motion.axes[v], motion)
-        return B
+        motion, turning = self.motion(joint, other), self.turning(self.tree.body_joint[b])
+        is_turned = np.isin(self.joint_of, turning)[:, None, None]
+        return is_turned * self.in_body(b, motion.axes, motion)
 
-    def in_body(self, b: int, vector: ndarray, motion: Motion | None = None) -> ndarray:
+    def in_body(self, b: int, vectors: ndarray, motion: Motion | None = None) -> ndarray:
         turn = (motion or self.motion()).turns[self.tree.body_joint[b]]
-        return np.einsum("sji,sj->si", turn, vector)
+        return np.einsum("sji,...sj->...si", turn, vectors)
 
-    # what becomes of them
-
-    def effects(self, slips: list[Changed]) -> list[list[ndarray]]:
+    def effects(self, slips: Iterable[Changed]) -> list[list[ndarray]]:
         """What each slip adds to the values, (states, entries), in each of the ways."""
-        n, bodies, tree = self.states, [item.body for item in slips], self.tree
-        J, B = (np.stack([those[b] for b in bodies]) for those in (self.J, self.B))
-        I = np.array(tree.inertia)[bodies][:, None] + np.zeros((1, len(self.q), 1, 1))
+        slips, tree, n = list(slips), self.tree, self.states
+        bodies = [item.body for item in slips]
         mass = np.array(tree.mass)[bodies]
-        J2 = np.stack([right if item.J is None else right + item.J for right, item in zip(J, slips)])
-        B2 = np.stack([right if item.B is None else right + item.B for right, item in zip(B, slips)])
-        I2 = np.stack([right if item.inertia is None else item.inertia for right, item in zip(I, slips)])
+        I = np.array(tree.inertia, complex)[:, None] + np.zeros((len(self.q), 1, 1))
+        right = [np.stack([those[b] for b in bodies]) for those in (self.J, self.B, I)]
+        wrong = [
+            np.stack([now[k] + getattr(item, name) for k, item in enumerate(slips)])
+            for name, now in zip(("J", "B", "inertia"), right)
+        ]
 
         def inertia_of(J: ndarray, B: ndarray, I: ndarray) -> ndarray:
             of_mass = np.einsum("k,kvsc,kwsc->ksvw", mass, J, J, optimize=True)
             return of_mass + np.einsum("kvsc,kscd,kwsd->ksvw", B, I, B, optimize=True)
 
-        M = inertia_of(J2, B2, I2) - inertia_of(J, B, I)
-        found = []
-        if self.has_slopes:
-            found.append(self.lagrange(M)[1])
-        found.append(self.newton_euler(mass, J2, B2, I2) - self.newton_euler(mass, J, B, I))
-        found.append(self.projected(bodies, J2, B2, I2) - self.projected(bodies, J, B, I))
-        rest = -np.einsum("k,kvsc,c->ksv", mass, (J2 - J)[:, :, :n].real, np.array(tree.gravity))
+        M = inertia_of(*wrong) - inertia_of(*right)
+        found, alone = [self.lagrange(M)] if self.has_slopes else [], self.forces(mass, right, right)
+        found += [self.forces(mass, wrong, moving) - alone for moving in (wrong, right)]
+        rest = -np.einsum("k,kvsc,c->ksv", mass, (wrong[0] - right[0])[:, :, :n].real, np.array(tree.gravity))
         pack = self.equations.layout.packed
         return [[pack(M[k, :n].real, of_h[k], rest[k]) for of_h in found] for k in range(len(slips))]
 
-    def lagrange(self, M: ndarray) -> tuple[ndarray, ndarray]:
-        """Parts of Mbar (slips, rows, nv, nv) at the states, and Mdot qd - d(qd' M qd / 2)/dq."""
+    def lagrange(self, M: ndarray) -> ndarray:
+        """Mdot qd - d(qd' M qd / 2)/dq of parts of Mbar (slips, rows, nv, nv), at the states."""
         n, nv, qd = self.states, self.nv, self.equations.qd
         slopes = M[:, n : n * (nv + 1)].imag.reshape(len(M), nv, n, nv, nv) / TINY
         moved = np.einsum("kjsab,sj,sb->ksa", slopes, qd, qd)
-        return M[:, :n].real, moved - np.einsum("kjsab,sa,sb->ksj", slopes, qd, qd) / 2.0
+        return moved - np.einsum("kjsab,sa,sb->ksj", slopes, qd, qd) / 2.0
 
-    def newton_euler(self, mass: ndarray, J: ndarray, B: ndarray, I: ndarray) -> ndarray:
+    def forces(self, mass: ndarray, along: list[ndarray], moving: list[ndarray]) -> ndarray:
+        """m J'a + B'(I alpha + omega x I omega), (slips, states, nv), of J, B and I, with the motion of others."""
         n, qd = self.states, self.equations.qd
-        a, alpha = (np.einsum("kvsc,sv->ksc", part[:, :, -n:].imag / TINY, qd) for part in (J, B))
-        omega = np.einsum("kvsc,sv->ksc", B[:, :, :n].real, qd)
-        return self.along(mass, J, B, I[:, :n].real, a, alpha, omega)
-
-    def projected(self, bodies: list[int], J: ndarray, B: ndarray, I: ndarray) -> ndarray:
-        n, qd = self.states, self.equations.qd
-        right = np.stack([self.J[b] for b in bodies]), np.stack([self.B[b] for b in bodies])
-        a, alpha = (np.einsum("kvsc,sv->ksc", part[:, :, -n:].imag / TINY, qd) for part in right)
-        omega = np.einsum("kvsc,sv->ksc", right[1][:, :, :n].real, qd)
-        return self.along(np.array(self.tree.mass)[bodies], J, B, I[:, :n].real, a, alpha, omega)
-
-    def along(
-        self, mass: ndarray, J: ndarray, B: ndarray, I: ndarray, a: ndarray, alpha: ndarray, omega: ndarray
-    ) -> ndarray:
-        """m J'a + B'(I alpha + omega x I omega), (slips, states, nv)."""
-        n = self.states
+        J, B, I = along[0][:, :, :n].real, along[1][:, :, :n].real, along[2][:, :n].real
+        a, alpha = (np.einsum("kvsc,sv->ksc", part[:, :, -n:].imag / TINY, qd) for part in moving[:2])
+        omega = np.einsum("kvsc,sv->ksc", moving[1][:, :, :n].real, qd)
         spun = np.cross(omega, np.einsum("kscd,ksd->ksc", I, omega))
         moment = np.einsum("kscd,ksd->ksc", I, alpha) + spun
-        force = np.einsum("k,kvsc,ksc->ksv", mass, J[:, :, :n].real, a, optimize=True)
-        return force + np.einsum("kvsc,ksc->ksv", B[:, :, :n].real, moment)
+        force = np.einsum("k,kvsc,ksc->ksv", mass, J, a, optimize=True)
+        return force + np.einsum("kvsc,ksc->ksv", B, moment)

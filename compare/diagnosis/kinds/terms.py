@@ -1,4 +1,4 @@
-"""Places that are a factor: of terms, of entries and coefficients; all places of a search."""
+"""Factors of terms, of parts of them, of entries of Mbar and h and of coefficients of speeds."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain, combinations, combinations_with_replacement
@@ -8,10 +8,12 @@ from numpy import ndarray
 
 import tmt
 
-from ..core.words import listed
+from ...core.words import listed
+from ..hypothesis import ALL, FIT_ROUNDING, Hypothesis, factor, number
+from ..layout import MOST_SPEEDS, Entry
+from ..model import OF_TERM, TINY, Equations
 from .kinematics import SAME, Kinematics
-from .model import MOST_SPEEDS, OF_TERM, TINY, Entry, Equations
-from .places import ALL, FIT_ROUNDING, XYZ, Place, factor, forces, numbers, sets_of_bodies
+from .numbers import XYZ, sets_of_bodies
 
 TOGETHER = {  # terms that are often left out together
     "all moments of {} in the bias": ("Euler", "gyroscopic"),
@@ -19,16 +21,7 @@ TOGETHER = {  # terms that are often left out together
     "all of the rotation of {}": ("rotation", "Euler", "gyroscopic"),
 }
 MOST_ENTRIES = 10  # of Mbar, in which cross terms are tried alone
-
-
-def all_places(equations: Equations) -> list[Place]:
-    """The places that have an influence at some state, as far as that is known beforehand."""
-    kinds = numbers, terms, parts_of_translation, coefficients, forces_in_bias
-    places = chain.from_iterable(places_of(equations) for places_of in kinds)
-    return [place for place in places if place.column is None or place.column.any()]
-
-
-# entries of which a factor may be wrong
+PART, COEFFICIENT = 0.3, 0.3  # costs of a part of a term, and of an entry, a coefficient or all
 
 
 def unit_columns(equations: Equations) -> dict[str, ndarray]:
@@ -86,27 +79,13 @@ def in_rows(equations: Equations, rows: list[int]) -> list[int]:
     return [entry for i in rows for entry in equations.layout.of_row(i)]
 
 
-# places
-
-
-def forces_in_bias(equations: Equations) -> Iterator[Place]:
-    """Damping and springs of joints that were added to h."""
-    none, zero = 0.0 * equations.parts[0], 0.0 * equations.qd
-    for place in forces(equations.tree, equations.q, equations.qd):
-        is_damping = place.name.startswith("damping")
-        if place.column is not None and (is_damping or place.name.startswith("stiffness")):
-            parts = (place.column, zero) if is_damping else (zero, place.column)
-            column = equations.layout.packed(none, *parts)
-            yield place._replace(kind="force", name=f"{place.name} in h", stated=0.0, column=column)
-
-
-def terms(equations: Equations) -> Iterator[Place]:
+def terms(equations: Equations) -> Iterator[Hypothesis]:
     """Factors of terms of each body, and of several together: in all, in an entry of Mbar, a row of h."""
     bodies, is_small = sets_of_bodies(equations.tree), equations.nv <= MOST_SPEEDS
     of_rows = {name: in_rows(equations, rows) for name, rows in rows_of_h(equations).items()}
     for name, together in ({name: (term,) for term, name in OF_TERM.items()} | TOGETHER).items():
         added = np.sum([equations.terms[term] for term in together], axis=0)
-        for body, those in bodies.items():
+        for body, those in bodies:
             column = added[those].sum(axis=0)
             yield factor("term", name.format(body), column, form=name, owners=len(those))
             if is_small and len(together) == len(those) == 1:
@@ -115,86 +94,81 @@ def terms(equations: Equations) -> Iterator[Place]:
                         yield factor("term", f"{name.format(body)} in {where}", column, entries)
 
 
-def coefficients(equations: Equations) -> Iterator[Place]:
+def coefficients(equations: Equations) -> Iterator[Hypothesis]:
     """Factors of entries of Mbar, rows of h and their two parts, and coefficients of products of speeds."""
     layout, right, (M, velocity_terms, rest) = equations.layout, equations.right, equations.parts
     for name, entries in entries_of_M(equations).items():
-        yield factor("coefficient", name, right, entries)
+        yield factor("coefficient", name, right, entries, COEFFICIENT)
     parts = {"M": equations.in_M, "h": equations.in_h, "M and h": ALL} if layout.qdd is None else {}
     for name, part in parts.items():
-        yield factor("whole", f"all of {name}", right, part)
+        yield factor("whole", f"all of {name}", right, part, COEFFICIENT)
     of_h = {"": (velocity_terms, rest), "velocity terms of ": (velocity_terms, 0.0 * rest)}
     of_h |= {"gravity of ": (0.0 * rest, rest)}
     for name, rows in rows_of_h(equations).items():
         for before, values in of_h.items():
             column = layout.packed(0.0 * M, *values)
-            yield factor("coefficient", f"{before}{name}", column, in_rows(equations, rows))
+            yield factor("coefficient", f"{before}{name}", column, in_rows(equations, rows), COEFFICIENT)
     if equations.nv > MOST_SPEEDS:
         return
 
-    def place(name: str, terms: list[tuple[Entry, ndarray]]) -> Place:
+    def together(name: str, terms: list[tuple[Entry, ndarray]]) -> Hypothesis:
         """The factor of some velocity terms."""
         column = sum(values[:, None] * units[entry.named(equations.speeds)] for entry, values in terms)
-        return factor("coefficient", name, column + 0.0 * right)
+        return factor("coefficient", name, column + 0.0 * right, cost=COEFFICIENT)
 
     terms = [(entry, values) for entry, values in equations.coefficients.items() if entry.kind == "velocity"]
     largest, units = max(np.abs(values).max() for _, values in terms), unit_columns(equations)
     for term in terms:
         name = term[0].named(equations.speeds)
         if np.abs(term[1]).max() > FIT_ROUNDING * largest:
-            yield place(name, [term])
+            yield together(name, [term])
         else:
-            yield Place("added", name, 0.0, "", 1.0, column=units[name])
+            yield number(name, 0.0, "", COEFFICIENT, "added", column=units[name])
     joints = speeds_of_joints(equations.tree)
     for first, second in combinations_with_replacement(joints, 2):
         those = [term for term in terms if is_between(term[0].at[1:], joints[first], joints[second])]
-        yield place(f"products of the speeds of {first} and {second} in h", those)
+        yield together(f"products of the speeds of {first} and {second} in h", those)
     for i, j in chain.from_iterable(((i, j), (j, i)) for i, j in combinations(range(equations.nv), 2)):
         moved = np.zeros_like(rest)
         moved[:, i] = rest[:, j]
-        name = f"gravity of h[{equations.speeds[j]}] in h[{equations.speeds[i]}]"
-        yield factor("coefficient", name, layout.packed(0.0 * M, 0.0 * rest, moved), stated=0.0)
+        name, column = f"gravity of h[{equations.speeds[j]}] in h[{equations.speeds[i]}]", 0.0 * rest
+        column = layout.packed(0.0 * M, column, moved)
+        yield factor("coefficient", name, column, cost=COEFFICIENT, stated=0.0)
 
 
-def parts_of_translation(equations: Equations) -> Iterator[Place]:
+def squares_of_velocities(equations: Equations) -> Iterator[Hypothesis]:
     """Factors in v^2 of a body's CoM, and the mass with which it moves along some axes.
 
     v is the sum of those of its segments, v^2 of their squares and products: in all, in an entry of Mbar.
     """
     if equations.nv > MOST_SPEEDS:
         return
-    kinematics, layout, tree, nv = Kinematics(equations), equations.layout, equations.tree, equations.nv
-    entries = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]]
+    kinematics, layout, tree = Kinematics(equations), equations.layout, equations.tree
+    entries, n = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]], len(equations.q)
 
-    def column(
-        mass: float, pairs: list[tuple[ndarray, ndarray]], gravity: ndarray, lifted: ndarray | None = None
-    ) -> ndarray:
-        n, M, h = len(equations.q), 0.0 * equations.parts[0], 0.0 * equations.qd
-        lifted = pairs[0][0] if lifted is None else lifted
+    def column(pairs: list[tuple[ndarray, ndarray]], gravity: ndarray) -> ndarray:
+        """What a mass of 1 adds whose v^2 has these products of Jacobians, and its weight."""
+        M, h = 0.0 * equations.parts[0], 0.0 * equations.qd
         for J, other in pairs:
             a = np.einsum("vsc,sv->sc", other[:, -n:].imag / TINY, equations.qd)
-            M = M + mass * np.einsum("vsc,wsc->svw", J[:, :n].real, other[:, :n].real)
-            h = h + mass * np.einsum("vsc,sc->sv", J[:, :n].real, a)
-        return layout.packed(M, h, -mass * np.einsum("vsc,c->sv", lifted[:, :n].real, gravity))
+            M = M + np.einsum("vsc,wsc->svw", J[:, :n].real, other[:, :n].real)
+            h = h + np.einsum("vsc,sc->sv", J[:, :n].real, a)
+        return layout.packed(M, h, -np.einsum("vsc,c->sv", pairs[0][0][:, :n].real, gravity))
 
     for b in (b for b, joint in enumerate(tree.body_joint) if joint >= 0):
-        body, mass, segments = tree.body_names[b], float(tree.mass[b]), kinematics.segments(b)
+        body, segments, mass = tree.body_names[b], kinematics.segments(b), float(tree.mass[b])
         pairs = combinations_with_replacement(segments, 2) if len(segments) > 1 else ()
         for first, second in pairs:
             both = [(first.jacobian, second.jacobian), (second.jacobian, first.jacobian)]
-            added = column(mass, both if first is not second else both[:1], np.zeros(3))
+            added = mass * column(both if first is not second else both[:1], np.zeros(3))
             name = f"2 ({first.name}) * ({second.name}) in v^2 of {body}"
             name = f"({first.name})^2 in v^2 of {body}" if first is second else name
-            yield factor("part", name, added)
-            if first.slides and first is not second:
-                moment = added + column(mass, [], np.array(tree.gravity), second.jacobian)
-                yield factor("part", f"mass of {body} times ({second.name}) along {first.name}", moment)
+            yield factor("part", name, added, cost=PART)
             active = np.abs(added[:, layout.in_M]).max(axis=0) > SAME * np.abs(added).max()
             for k in np.flatnonzero(active).tolist() if len(entries) <= MOST_ENTRIES else ():
-                yield factor("part", f"{name} in {entries[k]}", added, [k])
+                yield factor("part", f"{name} in {entries[k]}", added, [k], PART)
         chosen = [np.isin(range(3), axes) for count in (1, 2) for axes in combinations(range(3), count)]
-        for axes in chosen if mass and nv > 1 else ():
-            J = kinematics.J[b] * axes
-            along = listed([XYZ[k] for k in np.flatnonzero(axes)])
-            added = column(1.0, [(J, J)], np.array(tree.gravity) * axes)
-            yield Place("part", f"mass of {body} along {along}", mass, "kg", mass, column=added, least=0.0)
+        for axes in chosen if mass and equations.nv > 1 else ():
+            J, along = kinematics.J[b] * axes, listed([XYZ[k] for k in np.flatnonzero(axes)])
+            added, name = column([(J, J)], np.array(tree.gravity) * axes), f"mass of {body} along {along}"
+            yield number(name, mass, "kg", PART, "part", column=added, size=mass, least=0.0)

@@ -6,8 +6,9 @@ A convention says at which state of the model the equations are, and how the use
 qd = S v. M = S' Mbar S, h = S' (h + Mbar drift), with drift = dS/dt v. Each kind is a function in KINDS.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from functools import partial
 from itertools import chain, combinations, permutations, product
 
 import numpy as np
@@ -17,18 +18,17 @@ import tmt
 from tmt.derivation.mechanism import turn_in_parent
 from tmt.derivation.vectors import Matrix
 
-from ..core.cause import Cause
-from ..core.words import listed
-from ..robots.joint_map import PER_UNIT, Joint, JointMap
-from .cause import together
-from .model import Equations
+from ...core.cause import Cause
+from ...core.words import listed
+from ...robots.joint_map import PER_UNIT, Joint, JointMap
+from ..cause import together
+from ..hypothesis import Hypothesis
+from ..model import Equations
 from .terms import speeds_of_joints
 
-FIRST, OF_NAME, OF_SLIDE = (
-    0.1,
-    0.15,
-    0.2,
-)  # costs of a sense: of the first joint, of each other, of a slide more
+COSTS = {"sign": 0.0, "order": 0.25, "unit": 0.1, "angles": 0.0, "displacement": 0.1, "axes": 0.15}  # of kinds
+FIRST, OF_NAME, OF_SLIDE = 0.1, 0.15, 0.2  # more, of the first joint, of each other, of a slide
+BLOCK = 64  # conventions that are evaluated together
 PARALLEL = 1e-9  # of a cosine from 1
 MOST_PERMUTED = 6  # joints in all orders; of more, orders in which programs count, and two exchanged
 MOST_TURNED = 10  # joints with all combinations of senses
@@ -46,11 +46,6 @@ class Convention:
     S: ndarray  # (states, nv, nv)
     drift: ndarray  # (states, nv)
     joints: JointMap | None = None  # how it is to be stated; None: it cannot be
-
-    def first(self, states: int) -> "Convention":
-        """At the first states."""
-        arrays = {name: getattr(self, name)[:states] for name in ("q", "qd", "S", "drift")}
-        return replace(self, **arrays)
 
     def applied(self, M: ndarray, velocity_terms: ndarray, rest: ndarray) -> tuple[ndarray, ndarray, ndarray]:
         """The model's Mbar, velocity terms and h at rest as they are in this convention."""
@@ -70,28 +65,36 @@ class Convention:
         return M, moved, np.einsum("sij,sj->si", transposed, rest)
 
 
-def all_conventions(equations: Equations) -> Iterator[Convention]:
-    for kind in KINDS:
-        yield from kind(equations)
+def conventions(equations: Equations) -> Iterator[Hypothesis]:
+    """The right equations in each convention, evaluated in blocks."""
+    every = [convention for kind in KINDS for convention in kind(equations)]
+    for start in range(0, len(every), BLOCK):
+        block = every[start : start + BLOCK]
+        q, qd = (np.concatenate([getattr(convention, name) for convention in block]) for name in ("q", "qd"))
+        parts = Equations(equations.tree, q, qd, equations.layout).parts
+        for convention, *of_model in zip(block, *(np.split(part, len(block)) for part in parts)):
+            values = equations.layout.packed(*convention.applied(*of_model))
+            yield Hypothesis(convention.cause, values - equations.right, convention=convention)
 
 
-def values_in(equations: Equations, those: Sequence[Convention]) -> Iterator[ndarray]:
-    """The values in each convention, (states, entries), evaluated together."""
-    if not those:
-        return
-    q, qd = (np.concatenate([getattr(convention, name) for convention in those]) for name in ("q", "qd"))
-    parts = Equations(equations.tree, q, qd, equations.layout).parts
-    for convention, *of_model in zip(those, *(np.split(part, len(those)) for part in parts)):
-        yield equations.layout.packed(*convention.applied(*of_model))
+def named(kind: str, place: str, explains: str, cost: float = 0.0, rank: int = 1, stated: str = "") -> Cause:
+    """The cause of a convention; cost: beside that of its kind."""
+    about = partial(Cause, rank=rank, kind=kind, cost=COSTS[kind] + cost)
+    return about(place=place, stated=stated, explains=explains)
 
 
-def stated(
-    equations: Equations, kind: str, place: str, was: str, explains: str, joints: Iterable[Joint],
-    rank: int = 1, cost: float = 0.0,
-) -> Convention:  # fmt: skip
+def constant(equations: Equations, cause: Cause, S: ndarray, q: ndarray | None = None) -> Convention:
+    """A convention with the same S (nv, nv) at all states."""
+    q, everywhere = equations.q if q is None else q, np.broadcast_to(S, (len(equations.q), *S.shape))
+    return Convention(cause, q, equations.qd @ S.T, everywhere, 0.0 * equations.qd)
+
+
+# of joints, which can be stated
+
+
+def stated(equations: Equations, cause: Cause, joints: Iterable[Joint]) -> Convention:
     """A convention that can be stated by the joints."""
     joint_map, identity = JointMap(equations.coordinates, list(joints)), np.eye(equations.nv)
-    cause = Cause(rank=rank, kind=kind, place=place, stated=was, explains=explains, cost=cost)
     S = np.broadcast_to(joint_map.own_forces(identity), (len(equations.q), *identity.shape))
     q, qd = joint_map.positions(equations.q), joint_map.speeds(equations.qd)
     return Convention(cause, q, qd, S, 0.0 * qd, joint_map)
@@ -108,14 +111,14 @@ def senses(equations: Equations) -> Iterator[Convention]:
     right = joints_of(equations)
     for chosen in chosen_senses(equations):
         turned = right | {name: right[name]._replace(sign=-1.0) for name in chosen}
-        cost = cost_of(chosen, [name for name in chosen if right[name].slides])
-        place = f"sense of {listed(chosen)}"
-        yield stated(equations, "sign", place, "+", "-", turned.values(), cost=cost)
+        cost = cost_of(len(chosen)) + OF_SLIDE * sum(right[name].slides for name in chosen)
+        cause = named("sign", f"sense of {listed(chosen)}", "-", cost, stated="+")
+        yield stated(equations, cause, turned.values())
 
 
-def cost_of(joints: Sequence[str], slides: Sequence[str]) -> float:
+def cost_of(joints: int) -> float:
     """What a convention of some joints costs more."""
-    return FIRST + OF_NAME * (len(joints) - 1) + OF_SLIDE * len(slides)
+    return FIRST + OF_NAME * (joints - 1)
 
 
 def chosen_senses(equations: Equations) -> list[tuple[str, ...]]:
@@ -139,8 +142,8 @@ def orders(equations: Equations) -> Iterator[Convention]:
         for chosen in ((), *of_senses):
             joints = [right[name]._replace(sign=-1.0 if name in chosen else 1.0) for name in order]
             what, rank = ("order and senses of the joints", 3) if chosen else ("order of the joints", 1)
-            named = ", ".join(map(str, joints))
-            yield stated(equations, "order", what, ", ".join(names), named, joints, rank)
+            cause = named("order", what, ", ".join(map(str, joints)), rank=rank, stated=", ".join(names))
+            yield stated(equations, cause, joints)
 
 
 def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
@@ -158,44 +161,39 @@ def named_orders(tree: tmt.Tree) -> Iterator[list[str]]:
 def units(equations: Equations) -> Iterator[Convention]:
     right = joints_of(equations)
     hinges = [name for name, kind in zip(right, equations.coordinates.all_kinds) if kind == "hinge"]
-    places = {name: [name] for name in hinges} | ({"all hinges": hinges} if len(hinges) > 1 else {})
-    for (place, those), unit in product(places.items(), filter(None, PER_UNIT)):
+    sets = [(name, [name]) for name in hinges] + [("all hinges", hinges)] * (len(hinges) > 1)
+    for (place, those), unit in product(sets, filter(None, PER_UNIT)):
         in_unit = right | {name: right[name]._replace(unit=unit) for name in those}
-        yield stated(equations, "unit", f"unit of {place}", "rad", unit, in_unit.values())
+        yield stated(equations, named("unit", f"unit of {place}", unit, stated="rad"), in_unit.values())
+
+
+# of coordinates and speeds
 
 
 def from_the_world(equations: Equations) -> Iterator[Convention]:
     """Angles or displacements measured from the world, not from the body before, of any of parallel joints."""
-    for kind, name in {"hinge": "angle", "slide": "displacement"}.items():
-        yield from absolute_coordinates(equations, kind, name)
-
-
-def absolute_coordinates(equations: Equations, kind: str, name: str) -> Iterator[Convention]:
     tree, joints = equations.tree, equations.tree.coordinates.joints
-    before = {i: parallel_before(tree, i) for i, other in enumerate(tree.kind) if other == kind}
-    at_q, at_v = ([getattr(joints[i], name).start for i in before] for name in ("q", "qd"))
-    absolute = np.eye(equations.nv)  # rows: angles from the world as sums of angles between bodies
-    chained = [i for i, (parent, _) in before.items() if parent >= 0]
-    for i in chained:
-        parent, along = before[i]
-        absolute[joints[i].qd.start] += along * absolute[joints[parent].qd.start]
-    counts = range(1, len(chained) + 1) if len(chained) <= MOST_ABSOLUTE else (1, len(chained))
-    for chosen in chain.from_iterable(combinations(chained, count) for count in counts):
-        own, q = np.eye(equations.nv), equations.q.copy()
-        rows = [joints[i].qd.start for i in chosen]
-        own[rows] = absolute[rows]
-        A = np.linalg.inv(own)
-        q[:, at_q] = q[:, at_q] @ A[np.ix_(at_v, at_v)].T
-        place = f"{name} of {listed([tree.joint_names[i] for i in chosen])}"
-        explains, (parent, _) = "measured from the world", before[chosen[0]]
-        if len(chosen) == 1 and parent in tree.body_joint:
-            explains += f", not from {tree.body_names[tree.body_joint.index(parent)]}"
-        was = "between a body and the one before"
-        cost = cost_of([tree.joint_names[i] for i in chosen], ())
-        of_kind = "angles" if kind == "hinge" else "displacement"
-        cause = Cause(rank=1, kind=of_kind, place=place, stated=was, explains=explains, cost=cost)
-        S = np.broadcast_to(A, (len(q), *A.shape))
-        yield Convention(cause, q, equations.qd @ A.T, S, 0.0 * equations.qd)
+    for kind, of_kind, name in (("hinge", "angles", "angle"), ("slide", "displacement", "displacement")):
+        before = {i: parallel_before(tree, i) for i, other in enumerate(tree.kind) if other == kind}
+        at_q, at_v = ([getattr(joints[i], part).start for i in before] for part in ("q", "qd"))
+        absolute = np.eye(equations.nv)  # rows: angles from the world as sums of angles between bodies
+        chained = [i for i, (parent, _) in before.items() if parent >= 0]
+        for i in chained:
+            parent, along = before[i]
+            absolute[joints[i].qd.start] += along * absolute[joints[parent].qd.start]
+        counts = range(1, len(chained) + 1) if len(chained) <= MOST_ABSOLUTE else (1, len(chained))
+        for chosen in chain.from_iterable(combinations(chained, count) for count in counts):
+            own, q = np.eye(equations.nv), equations.q.copy()
+            rows = [joints[i].qd.start for i in chosen]
+            own[rows] = absolute[rows]
+            A = np.linalg.inv(own)
+            q[:, at_q] = q[:, at_q] @ A[np.ix_(at_v, at_v)].T
+            place = f"{name} of {listed([tree.joint_names[i] for i in chosen])}"
+            explains, (parent, _) = "measured from the world", before[chosen[0]]
+            if len(chosen) == 1 and parent in tree.body_joint:
+                explains += f", not from {tree.body_names[tree.body_joint.index(parent)]}"
+            cause = named(of_kind, place, explains, cost_of(len(chosen)), stated="from the body before")
+            yield constant(equations, cause, A, q)
 
 
 def parallel_before(tree: tmt.Tree, i: int) -> tuple[int, float]:
@@ -233,21 +231,13 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
                 S[:, v, v] = R
                 drift[:, v] = np.einsum("sij,sj->si", R, np.cross(own_qd[:, joint.qd], qd[:, v]))
                 own_qd = np.einsum("sij,sj->si", S, qd)
-            causes = [
-                Cause(rank=1, kind="axes", place=place, stated="", explains=explains)
-                for place, explains in said.items() if explains
-            ]  # fmt: skip
+            causes = [named("axes", place, explains) for place, explains in said.items() if explains]
             if causes:
                 yield Convention(together(causes, 0.0), own_q, own_qd, S, drift)
-        for explains, factor in {
-            "twice as large, q' = q omega for q omega / 2": 2.0,
-            "half as large": 0.5,
-        }.items():
-            S = np.tile(np.eye(equations.nv), (len(q), 1, 1))
-            S[:, joint.qd, joint.qd] *= factor
-            place = f"angular velocity of {name}"
-            cause = Cause(rank=1, kind="axes", place=place, stated="", explains=explains)
-            yield Convention(cause, q, np.einsum("sij,sj->si", S, qd), S, 0.0 * qd)
+        for explains, factor in {"twice as large, q' = q omega for q omega / 2": 2.0, "half as large": 0.5}.items():
+            S = np.eye(equations.nv)
+            S[joint.qd, joint.qd] *= factor
+            yield constant(equations, named("axes", f"angular velocity of {name}", explains), S)
 
 
 def orders_of_speeds(equations: Equations) -> Iterator[Convention]:
@@ -261,9 +251,7 @@ def orders_of_speeds(equations: Equations) -> Iterator[Convention]:
         blocks[slides if kind == "slide" else name] = of_joints[slides if kind == "slide" else name]
     for order in list(permutations(blocks))[1:] if len(blocks) <= MOST_OF_BOTH else ():
         S = np.eye(equations.nv)[:, [v for name in order for v in blocks[name]]]
-        cause = Cause(rank=1, kind="order", place="order of the speeds", stated="", explains="; ".join(order))
-        turned = np.broadcast_to(S, (len(equations.q), *S.shape))
-        yield Convention(cause, equations.q, equations.qd @ S.T, turned, 0.0 * equations.qd)
+        yield constant(equations, named("order", "order of the speeds", "; ".join(order)), S)
 
 
 def matrices(turn: Matrix, count: int) -> ndarray:

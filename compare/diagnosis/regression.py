@@ -1,0 +1,247 @@
+"""Several numbers at once, by regression: the ten inertial numbers of a body, in which Mbar and h are linear; the
+same number of all joints or bodies; the three components of an offset or a CoM. One number in values with noise,
+as of a log, with its uncertainty.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy import ndarray
+
+from tmt import Tree
+
+from ..core.cause import Cause
+from ..core.words import listed
+from ..robots.coordinates import point_inertia
+from .fit import Family, Search, nearest_change
+from .given import Given
+from .hypothesis import SMALL, Hypothesis, is_round, is_written, of_number
+from .kinds.edits import angles_of
+from .kinds.numbers import INERTIA, numbers
+from .layout import Values
+from .model import Equations
+
+RANK = 1e-9  # of the largest singular value
+ZERO = 1e-5  # m, or m2: what is no length of a load
+SEVERAL, TURNED = 0.5, 0.2  # costs
+OF_BODY = ("mass", "com", "inertia")  # fields
+
+
+def several(equations: Equations, family: Family, search: Search) -> Iterator[Cause]:
+    """Causes of several numbers; family: the numbers of the model."""
+    groups: dict[tuple[str, int], list[int]] = {}
+    for k, one in enumerate(family.hypotheses):
+        field, at = one.moves[0][0].field, one.moves[0][0].at
+        if len({(path.field, path.at[:1]) for path, _ in one.moves}) == 1:
+            if field in OF_BODY:
+                groups.setdefault(("body", at[0]), []).append(k)
+            if field in ("com", "offset"):
+                groups.setdefault((field, at[0]), []).append(k)
+            if field in ("mass", "armature"):
+                groups.setdefault((field, -1), []).append(k)
+    triples = [chosen for (field, _), chosen in groups.items() if field in ("com", "offset")]
+    sets = [tuple(family.hypotheses[k] for k in chosen) for chosen in triples]
+    for fit in search.fitted(sets, np.zeros((len(sets), 3))):
+        yield from as_cause(equations, fit.hypotheses, fit.changes) if fit.explains else ()
+    for (field, owner), chosen in groups.items():
+        if field in ("com", "offset"):
+            continue
+        those = [family.hypotheses[k] for k in chosen]
+        added, determined = regressed(search, family.first[chosen])
+        tensor = [one.moves[0][0].field == "inertia" for one in those]
+        if field == "body":  # first with the mass and the CoM as stated
+            of_tensor, is_known = regressed(search, family.first[chosen][tensor])
+            if is_known.all():
+                added, determined = np.append(np.zeros(len(those) - len(of_tensor)), of_tensor), np.ones(len(those), bool)
+        active = np.abs(family.first[chosen]).max(axis=(1, 2)) > 0.0
+        added = added * [one.size for one in those]
+        if field == "body" and determined[active].any():
+            yield from of_body(equations, owner, those, added, determined, active)
+        elif determined.any() and all(one.is_possible(x) for one, x in zip(those, added)):
+            yield from as_cause(equations, those, added)
+
+
+def regressed(search: Search, columns: ndarray) -> tuple[ndarray, ndarray]:
+    """Coefficients of columns (n, states, entries) that explain what is given, and which are determined.
+
+    All zero, and none determined, where they do not explain it.
+    """
+    A = (columns * search.weight).reshape(len(columns), -1).T
+    sizes = np.linalg.norm(A, axis=0)
+    active = sizes > 0.0
+    x, determined = np.zeros(len(columns)), np.zeros(len(columns), bool)
+    if not active.any():
+        return x, determined
+    U, s, Vt = np.linalg.svd(A[:, active] / sizes[active], full_matrices=False)
+    rank = s > RANK * s[0]
+    left = search.off.ravel()
+    for _ in range(3):  # refined: the columns have sizes far apart
+        x[active] += (Vt[rank].T @ ((U[:, rank].T @ left) / s[rank])) / sizes[active]
+        left = search.off.ravel() - A @ x
+    determined[active] = np.linalg.norm(Vt[rank], axis=0) > 1.0 - 1e-6
+    return (x, determined) if np.abs(left).max() <= 1.0 else (0.0 * x, determined & False)
+
+
+def of_body(
+    equations: Equations, b: int, those: Sequence[Hypothesis], added: ndarray, determined: ndarray,
+    active: ndarray,
+) -> Iterator[Cause]:  # fmt: skip
+    """The numbers of a body that differ, or a load on it: a further body that moves with it.
+
+    added: to first order, from which the moments of the mass follow: m, m c and I + m (c'c 1 - c c').
+    """
+    stated, moved = equations.stated, {"mass": np.zeros(()), "com": np.zeros(3), "inertia": np.zeros((3, 3))}
+    for one, change in zip(those, added):
+        for path, coefficient in one.moves:
+            moved[path.field][path.at[1:]] += coefficient * change
+    m, c, I = float(stated["mass"][b]), stated["com"][b], stated["inertia"][b]
+    mass, first, dc = float(moved["mass"]), float(moved["mass"]) * c + m * moved["com"], moved["com"]
+    second = point_inertia(c, mass) + moved["inertia"]  # as of a load about the origin
+    second = second + point_inertia(c + dc, m) - point_inertia(c, m) - point_inertia(dc, m)
+    if m + mass <= 0.0:
+        return
+    (origin, axes), is_known = equations.frame_of(b), bool(determined[4:].all())
+    is_tensor = is_known and abs(mass) < ZERO and np.abs(first).max() < ZERO
+    if is_tensor and (turned := turned_of(equations, b, I + second)):
+        yield turned
+        return
+    if determined[:4].all() and mass > SMALL * max(equations.tree.mass):
+        place = axes.T @ (first / mass - origin)
+        tensor = axes.T @ (second - point_inertia(first / mass, mass)) @ axes
+        is_body = not is_known or np.linalg.eigvalsh(tensor)[0] >= -ZERO * mass
+        if is_body and all(map(is_round, (mass, *place))):
+            where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(place) < ZERO, 0.0, place))
+            shown = [f", {name} {tensor[i, j]:.4g}" for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass]
+            explains = f"{mass:.5g} kg, CoM ({where}) m" + "".join([*shown, " kg m2"] if is_known and shown else [])
+            on = f"a load on {equations.tree.body_names[b]}"
+            yield Cause(rank=3, kind="numbers", place=on, stated="", explains=explains, cost=SEVERAL)
+            return
+    if determined[active].all():
+        com = (m * c + first) / (m + mass)
+        tensor = axes.T @ (I + point_inertia(c, m) + second - point_inertia(com, m + mass)) @ axes
+        values = [m + mass, *(axes.T @ (com - origin)), *(tensor[i, j] for _, i, j in INERTIA)]
+        changes = [x - float(one.cause.stated) for one, x in zip(those, values)]
+        yield from as_cause(equations, those, np.where(active, changes, 0.0))
+
+
+def turned_of(equations: Equations, b: int, tensor: ndarray) -> Cause | None:
+    """The tensor of a body about other axes, with the same principal moments: an inertial frame turned."""
+    axes = equations.frame_of(b).axes
+    (right, before), (moments, after) = (
+        np.linalg.eigh(axes.T @ I @ axes) for I in (equations.stated["inertia"][b], tensor)
+    )
+    if np.abs(moments - right).max() > SMALL * right[-1] or np.diff(right).min() <= ZERO * right[-1]:
+        return None
+    before, after = (vectors * [np.linalg.det(vectors), 1.0, 1.0] for vectors in (before, after))
+    signs = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+    near = sorted(((after * sign) @ before.T for sign in signs), key=np.trace, reverse=True)
+    for turn, how in product(near, ("turned", "turned back")):
+        angles = angles_of(turn if how == "turned" else turn.T)
+        angles, unit = np.where(np.abs(angles) < ZERO, 0.0, angles), "rad"
+        if all(map(is_round, np.degrees(angles))):
+            angles, unit = np.degrees(angles), "deg"
+        if all(map(is_round, angles)):
+            explains = f"{how} by rpy = ({', '.join(f'{angle:.5g}' for angle in angles)}) {unit}"
+            place = f"inertia of {equations.tree.body_names[b]}"
+            return Cause(rank=2, kind="numbers", place=place, stated="", explains=explains, cost=TURNED)
+    return None
+
+
+def as_cause(
+    equations: Equations, those: Sequence[Hypothesis], changes: Sequence[float] | ndarray
+) -> Iterator[Cause]:
+    """Several numbers as one cause, if there are several and each is one that people write."""
+    sizes: dict[str, float] = {}  # of the numbers with one unit
+    for one, x in zip(those, changes):
+        size, unit = max(abs(float(one.cause.stated)), abs(one.value(x))), one.cause.unit
+        sizes[unit] = max(sizes.get(unit, 0.0), size)
+    pairs = [
+        (one.cause, one.value(x)) for one, x in zip(those, changes) if abs(x) > SMALL * sizes[one.cause.unit]
+    ]
+    if len(pairs) < 2 or not all(is_written(x, float(cause.stated)) for cause, x in pairs):
+        return
+    names = [cause.place.partition(" of ") for cause, _ in pairs]
+    if len({owner for *_, owner in names}) == 1:
+        place = f"{listed(merged([name for name, *_ in names]))} of {names[0][2]}"
+    else:
+        place = f"{names[0][0]} of {listed([owner for *_, owner in names])}"
+    units = {cause.unit for cause, _ in pairs}
+    each = [cause.unit * (len(units) > 1) for cause, _ in pairs]
+    explains = ", ".join(f"{x:.6g} {unit}".strip() for (_, x), unit in zip(pairs, each))
+    stated = ", ".join(f"{cause.stated:.6g} {unit}".strip() for (cause, _), unit in zip(pairs, each))
+    unit = units.pop() if len(units) == 1 else ""
+    cost = SEVERAL + float(np.mean([of_number(x, float(cause.stated), equations) for cause, x in pairs]))
+    about: dict[str, Any] = {"stated": stated, "explains": explains, "unit": unit, "cost": cost}
+    yield Cause(rank=3, kind="several", place=place, **about)
+
+
+def merged(names: list[str]) -> list[str]:
+    """Names that begin alike as one: "CoM x", "CoM z" as "CoM x", "z"."""
+    firsts = [name.rpartition(" ")[0] for name in names]
+    pairs = zip(names, firsts, ["", *firsts])
+    return [name.removeprefix(f"{first} ") if first and first == before else name for name, first, before in pairs]
+
+
+# one number beside noise
+
+
+MOST_NOISE = 0.02  # of the values: what is larger is no noise
+MOST_OFF = 0.8  # of the states, at which each entry has noise
+LEAST_NUMBERS = 50
+WHITE = 6.0  # standard deviations: what of a place the noise may have
+LARGE = 20.0  # standard deviations: a change that is told
+
+
+class Noisy(NamedTuple):
+    """What least squares find: noise, and the cause if one number is wrong."""
+
+    noise: float  # of the values, a share
+    cause: Cause | None = None  # without its number
+    value: float = 0.0
+    deviation: float = 0.0  # its standard deviation
+
+    @property
+    def digits(self) -> int:
+        """Of the value, as many as its deviation leaves."""
+        return (
+            int(np.clip(np.ceil(np.log10(abs(self.value / self.deviation))) + 1, 2, 12)) if self.value else 1
+        )
+
+
+def through_noise(tree: Tree, values: Values, qdd: ndarray | None = None) -> Noisy | None:
+    """The number that is wrong beside noise, or noise alone; None where something else is left over."""
+    given = Given(tree, values, None, qdd=qdd)
+    equations = given.equations
+    search = Search(equations.values, given.packed, given.tolerance)
+    family = search.expanded(list(numbers(equations)))
+    first, second = family.first * search.weight, family.second * search.weight
+    count, off = int(search.known.sum()), search.off
+    of_values = given.packed if qdd is None else np.einsum("sij,sj->si", equations.parts[0], qdd)
+    entries = search.known.any(axis=0) & search.right.any(axis=0)
+    if count < LEAST_NUMBERS or not np.isfinite(off).all():
+        return None
+
+    def noise_of(left: ndarray) -> float | None:
+        """The share of noise in the values, if all that is left is that: no place explains a part of it."""
+        sigma = np.linalg.norm(left) / np.sqrt(count)
+        lengths = np.linalg.norm(first.reshape(len(first), -1), axis=1)
+        part = np.abs(np.einsum("kse,se->k", first, left)) / np.where(lengths > 0.0, lengths, 1.0)
+        share = np.linalg.norm(left * search.tolerance) / np.linalg.norm(of_values[search.known])
+        is_everywhere = bool((np.abs(left)[:, entries] > 1.0).mean(axis=0).min(initial=1.0) > MOST_OFF)
+        is_white = bool((part <= WHITE * sigma).all())
+        return float(share) if is_everywhere and is_white and share <= MOST_NOISE else None
+
+    alone = noise_of(off)
+    if alone is not None:
+        return Noisy(alone)
+    chosen = [k for k, one in enumerate(family.hypotheses) if one.cause.kind == "number" and one.is_quadratic]
+    fits = sorted((*nearest_change(first[k], second[k], off), k) for k in chosen)
+    for left_over, x, k in fits[:1]:
+        slope, place = first[k] + 2.0 * x * second[k], family.hypotheses[k]
+        noise = noise_of(off - x * first[k] - x * x * second[k])
+        deviation = left_over / np.sqrt(count - 1) / np.linalg.norm(slope)
+        if noise is not None and abs(x) > LARGE * deviation and place.is_possible(x * place.size):
+            return Noisy(noise, place.cause, place.value(x * place.size), float(deviation * place.size))
+    return None
