@@ -141,18 +141,24 @@ def of_accelerations(given: Given) -> Why:
     if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
         return solved if are_given else of_needed_forces(given, left_over)
     affine = Affine(given.tree, equations)
-    inputs = affine.inputs(q)
+    inputs, by_inputs = affine.inputs(q), None
     if inputs is not None and (np.abs(inputs - np.eye(len(inputs))) > CONSTANT).any():
         with_inputs = given.left_over(right, given.tau @ inputs.T)
-        return of_inputs(equations.coordinates.speeds, inputs, with_inputs, ratio)
+        by_inputs = of_inputs(equations.coordinates.speeds, inputs, with_inputs, ratio)
+        if by_inputs.is_found or are_given:
+            return by_inputs
     if are_given:
         return solved
     values = affine.values(q, qd, given.rounding)
     if values is None:
-        return of_needed_forces(given, left_over)
+        return by_inputs or of_needed_forces(given, left_over)
     bias = partial(affine.bias, q, values.mass_matrix)
-    functions = (bias, given.stated, affine.mass_matrix) if equations.seconds <= QUICK else ()
-    diagnosis = diagnose(given.tree, values, SECONDS_OF_CAUSE, *functions)
+    asked = partial(diagnose, given.tree, values, SECONDS_OF_CAUSE, with_forces=True)
+    if equations.seconds <= QUICK:
+        asked = partial(asked, bias=bias, stated=given.stated, mass_matrix=affine.mass_matrix)
+    diagnosis = asked()
+    if by_inputs and not diagnosis.causes:
+        return by_inputs
     return of_force(diagnosis.sentence(), diagnosis.causes, ratio)
 
 

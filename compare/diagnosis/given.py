@@ -32,7 +32,7 @@ class Given:
     def __init__(
         self, tree: Tree, values: Values, bias: Bias | None,
         mass_matrix: Callable[[ndarray], ndarray] | None = None, rest: ndarray | None = None,
-        qdd: ndarray | None = None,
+        qdd: ndarray | None = None, with_forces: bool = False,
     ):  # fmt: skip
         self.tree, self.values, self.bias, self.mass_matrix = tree, values, bias, mass_matrix
         M, h, nv = values.mass_matrix, values.bias, len(tree.axis)
@@ -41,7 +41,7 @@ class Given:
         self.rest = rest if rest is not None and np.isfinite(rest).all() else None
         skew = np.abs(M - np.swapaxes(M, 1, 2))
         is_symmetric = not (skew > 2.0 * values.tolerances[0] + ROUNDED * np.abs(M)).any()
-        self.layout = Layout(nv, self.rest is not None, is_symmetric, qdd)
+        self.layout = Layout(nv, self.rest is not None, is_symmetric, qdd, with_forces)
         self.equations = Equations(tree, values.q, values.qd, self.layout)
         at_rest = np.zeros_like(h) if self.rest is None else self.rest
         of_M, of_h = values.tolerances

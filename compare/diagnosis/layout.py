@@ -36,13 +36,15 @@ class Entry(NamedTuple):
 class Layout(NamedTuple):
     """What stands in a row of values: Mbar by rows, then h, or its velocity terms and h at rest.
 
-    With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone.
+    With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone. with_forces: whether h is what
+    accelerations leave beside the damping and springs of the model.
     """
 
     nv: int
     is_split: bool = False
     is_symmetric: bool = True  # the lower triangle of Mbar by rows, else all of it
     qdd: ndarray | None = None
+    with_forces: bool = False
 
     @property
     def places(self) -> tuple[ndarray, ndarray]:

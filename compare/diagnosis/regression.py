@@ -20,6 +20,7 @@ from .given import Given
 from .hypothesis import SMALL, Hypothesis, is_round, is_written, of_number
 from .kinds.edits import angles_of
 from .kinds.numbers import INERTIA, numbers
+from .kinds.terms import coefficients, squares_of_velocities, terms
 from .layout import Values
 from .model import Equations
 
@@ -215,7 +216,8 @@ def through_noise(tree: Tree, values: Values, qdd: ndarray | None = None) -> Noi
     given = Given(tree, values, None, qdd=qdd)
     equations = given.equations
     search = Search(equations.values, given.packed, given.tolerance)
-    family = search.expanded(list(numbers(equations)))
+    places = [*numbers(equations), *terms(equations), *coefficients(equations), *squares_of_velocities(equations)]
+    family = search.expanded(places)
     first, second = family.first * search.weight, family.second * search.weight
     count, off = int(search.known.sum()), search.off
     of_values = given.packed if qdd is None else np.einsum("sij,sj->si", equations.parts[0], qdd)

@@ -56,15 +56,17 @@ FIRST: tuple[Kind, ...] = (program_options, conventions, numbers, *FACTORS, edit
 def diagnose(
     tree: Tree, values: Values, seconds: float = inf, bias: Bias | None = None, stated: Stated | None = None,
     mass_matrix: Callable[[ndarray], ndarray] | None = None, qdd: ndarray | None = None,
+    with_forces: bool = False,
 ) -> Diagnosis:  # fmt: skip
     """What explains given values that differ from those of a tree's equations.
 
     seconds: for the search. bias: the given h at the same q and other speeds, and mass_matrix: the given Mbar
     at other q, if there are functions. stated: how the joints were stated, which may be wrong; None: they
-    cannot be. qdd: accelerations, of which the given h are the forces Mbar qdd + h.
+    cannot be. qdd: accelerations, of which the given h are the forces Mbar qdd + h. with_forces: whether h is what
+    accelerations leave beside the model's damping and springs, which are then in the convention of the joints too.
     """
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
-        given = Given(tree, values, bias, mass_matrix, qdd=qdd)
+        given = Given(tree, values, bias, mass_matrix, qdd=qdd, with_forces=with_forces)
         return Explanations(given, time.monotonic() + seconds, stated, seconds).diagnosis()
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from models import PATHS
 
+import compare
 import tmt
 from compare.diagnosis import Values
 from compare.diagnosis.consistency import conditions
@@ -132,3 +133,19 @@ def test_how_accelerations_were_computed_is_named(accelerations, place):
     assert left_over.causes[0].place == place
     right = LeftOver(SPRUNG, Values.of(SPRUNG, Q, QD, M, h), TAU, solved(M, TAU - passive - h))
     assert right.ratio <= 1.0 and right.causes == ()
+
+
+def test_displacements_from_the_world_are_named_of_accelerations_alone():
+    """A load on a spring on a cart on a spring; both heights are measured from the world, as are their springs' forces."""
+    cart = '<body name="cart"><joint name="z" type="slide" axis="0 0 1" stiffness="90" damping="4" springref=".1"/>{}</body>'
+    load = '<body name="load" pos="0 0 .3"><joint name="lift" type="slide" axis="0 0 1" stiffness="40" damping="3"/>{}</body>'
+    inertial = '<inertial pos="0 0 0" mass="{}" diaginertia="1 1 1"/>'
+    text = cart.format(inertial.format(2) + load.format(inertial.format(5)))
+
+    def acceleration(q, qd, tau):
+        between = 40.0 * (q[1] - q[0]) + 3.0 * (qd[1] - qd[0])
+        of_cart = tau[0] - 90.0 * (q[0] - 0.1) - 4.0 * qd[0] + between
+        return np.array([of_cart / 2.0 - 9.81, (tau[1] - between) / 5.0 - 9.81])
+
+    with pytest.raises(AssertionError, match="lift: measured from the world, not from cart"):
+        compare.assert_agrees(f"<mujoco><worldbody>{text}</worldbody></mujoco>", acceleration=acceleration)

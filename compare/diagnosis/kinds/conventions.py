@@ -15,6 +15,7 @@ import numpy as np
 from numpy import ndarray
 
 import tmt
+from tmt import literal
 from tmt.derivation.mechanism import turn_in_parent
 from tmt.derivation.vectors import Matrix
 
@@ -68,13 +69,23 @@ class Convention:
 def conventions(equations: Equations) -> Iterator[Hypothesis]:
     """The right equations in each convention, evaluated in blocks."""
     every = [convention for kind in KINDS for convention in kind(equations)]
+    tree, here = equations.tree, forces(equations.tree, equations.q, equations.qd)
     for start in range(0, len(every), BLOCK):
         block = every[start : start + BLOCK]
         q, qd = (np.concatenate([getattr(convention, name) for convention in block]) for name in ("q", "qd"))
         parts = Equations(equations.tree, q, qd, equations.layout).parts
         for convention, *of_model in zip(block, *(np.split(part, len(block)) for part in parts)):
-            values = equations.layout.packed(*convention.applied(*of_model))
+            M, *of_h = convention.applied(*of_model)
+            if equations.layout.with_forces:
+                S, there = convention.S, forces(tree, convention.q, convention.qd)
+                of_h = [h + np.einsum("sji,sj->si", S, x) - y for h, x, y in zip(of_h, there, here)]
+            values = equations.layout.packed(M, *of_h)
             yield Hypothesis(convention.cause, values - equations.right, convention=convention)
+
+
+def forces(tree: tmt.Tree, q: ndarray, qd: ndarray) -> tuple[ndarray, ndarray]:
+    """Those of damping, and of springs, that act against the motion, (states, nv)."""
+    return np.array(tree.damping) * qd, literal.spring_torque(tree, q)
 
 
 def named(kind: str, place: str, explains: str, cost: float = 0.0, rank: int = 1, stated: str = "") -> Cause:
