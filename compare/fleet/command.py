@@ -101,7 +101,11 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     solution = solution_of(options.reference)
     path = os.path.abspath(solution.path) if solution else ""
     file_options = FleetOptions(names, not options.full, options.reference, path)
-    make = partial(Cluster, options.dask) if options.dask else partial(Pool, options.workers or cores(), loaded=[LOADED])
+    make = (
+        partial(Cluster, options.dask)
+        if options.dask
+        else partial(Pool, options.workers or cores(), loaded=[LOADED])
+    )
     with locked(out), closing(make(options.limit)) as executor:
         run = Run(models, file_options, executor, out, solution)
         terminal.how_far = run.progress

@@ -124,7 +124,9 @@ def test_with_a_reference_what_asks_about_one_file_is_for_full_runs(words, has_r
 
     monkeypatch.setattr("compare.fleet.run.Run", run)
     assert main(["fleet", "m", "--out", "asked", *words.split()]) == 2
-    assert {"parameters", "mass", "trajectory", "diagnosis"} <= {*seen} and not {"speed", "derivatives"} & {*seen}
+    assert {"parameters", "mass", "trajectory", "diagnosis"} <= {*seen} and not {"speed", "derivatives"} & {
+        *seen
+    }
     assert [name in seen for name in ("stability", "reduction")] == [has_rest] * 2
 
 

@@ -209,8 +209,13 @@ def test_a_tolerance_is_in_words_and_its_formulas_are_on_a_page_of_their_own(fol
     of.tolerance = "Rounding of <each>\nentry.\n\n64 eps x L & more,\nof all."
     document = Document(report_of(folder, [of]))
     text, page = document.text(), document.tolerances()
-    assert "Rounding of &lt;each&gt; entry. [Formulas](tolerances.html#mass)." in text and "64 eps x L" not in text
-    assert '<section id="mass">' in page and "64 eps x L &amp; more, of all." in page and "Rounding" not in page
+    assert (
+        "Rounding of &lt;each&gt; entry. [Formulas](tolerances.html#mass)." in text
+        and "64 eps x L" not in text
+    )
+    assert (
+        '<section id="mass">' in page and "64 eps x L &amp; more, of all." in page and "Rounding" not in page
+    )
 
 
 @pytest.mark.parametrize("name, is_said", [("mass", True), ("stability", False)])
@@ -218,17 +223,28 @@ def test_what_a_comparison_switches_off_is_said_where_something_is_compared(name
     robot = compared_with("model", str(PATHS["quadruped"])).robot
     report = report_of(folder, [section(name, GOOD)], robot=robot)._replace(first_lines=["reference: model"])
     text = Document(report).text()
-    for words in ("Switched off in MuJoCo", "are compared with MuJoCo's", "reference: model", "tolerance that was fixed"):
+    for words in (
+        "Switched off in MuJoCo",
+        "are compared with MuJoCo's",
+        "reference: model",
+        "tolerance that was fixed",
+    ):
         assert (words in text) == is_said
     assert (text.startswith("# quadruped.xml: stability")) != is_said
 
 
 def test_the_answer_to_one_question_has_its_table(folder, monkeypatch):
-    template = "{% macro said() %}\nUse {{ 2 }}.\n| way | < what |\n| a | {{ '<b>' }} |\nAnd more.\n{% endmacro %}"
+    template = (
+        "{% macro said() %}\nUse {{ 2 }}.\n| way | < what |\n| a | {{ '<b>' }} |\nAnd more.\n{% endmacro %}"
+    )
     loaders = [DictLoader({"odd.md.jinja": template}), environment().loader]
     monkeypatch.setattr(environment(), "loader", ChoiceLoader(loaders))
     sections = [section("stability", GOOD), section("mass", GOOD)]
     sections[0].result.top = [Finding("odd", "said")]
     alone, both = (Document(report_of(folder, few)).text() for few in (sections[:1], sections))
-    assert "| way | what |" in alone and "| a | &lt;b&gt; |" in alone and alone.index("Use 2.") < alone.index("And more.")
+    assert (
+        "| way | what |" in alone
+        and "| a | &lt;b&gt; |" in alone
+        and alone.index("Use 2.") < alone.index("And more.")
+    )
     assert "| way |" not in both and "Use 2. And more." in both

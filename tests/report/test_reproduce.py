@@ -85,13 +85,13 @@ def runs(tmp_path_factory):
     """The script of states, of a run that is stable up to some step, and of one with a smaller file."""
     folder = tmp_path_factory.mktemp("runs")
     (folder / "mass.xml").write_text(SWING)
-    (folder / "reduction.xml").write_text(SWING)
+    (folder / "reduction.xml").write_text(STIFF)
     (folder / "stability.xml").write_text(STIFF)
     scripts = {}
     for name, more in {
         "mass": [],
         "stability": [],
-        "reduction": ["--write", str(folder / "small.xml")],
+        "reduction": ["--error", "0.1", "--write", str(folder / "small.xml")],
     }.items():
         (folder / name).mkdir()
         scripts[name] = report_of(folder / name, name, "--mjcf", str(folder / f"{name}.xml"), *more)
