@@ -187,7 +187,8 @@ def write_report(
         words = f"{block('verdict', 'interrupted', **numbers)}\n{words}"
         left_out |= {name: block("run", "interrupted") for name in interrupted if name not in names}
     named = {"kind": reference.kind, "name": reference.name}
-    plain = compared.mujoco.plain(robot.case())
+    has_states = not all(section.record.runs_file for section in sections)
+    plain = compared.mujoco.plain(robot.case() if has_states else None)
     about = words, causes, list(left_out.items()), named, reference.lines, plain, not interrupted
     report = Report(sections, robot, origin, *about)
     files.write(folder, report)

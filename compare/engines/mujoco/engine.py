@@ -77,24 +77,27 @@ class Mujoco(Engine):
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         return methods_for(case.tree) if case.controller else self.methods
 
-    def plain(self, case: Case) -> dict[str, Any]:
-        """How MuJoCo alone, with the file as it is, evaluates the states of a case; as JSON has it.
+    def plain(self, case: Case | None) -> dict[str, Any]:
+        """How MuJoCo alone reads the file as it is, and evaluates the states of a case, if there is one; as JSON has it.
 
+        why: why it does not read this file. least: a mass for links without one, which it refuses; None: there are none.
         qpos: positions, with the places of the case's joints in them; dofs: those of their speeds. zero: fields of the model
         to be set to zero, where all that a Tree does not have is switched off, else None. gravity: of the equations, m/s2.
-        mass_alone: M follows from masses, tensors and armature of joints alone. least: a mass for links without one, which
-        MuJoCo refuses; None: there are none. why: why MuJoCo does not read this file.
+        mass_alone: M follows from masses, tensors and armature of joints alone.
         """
-        dynamics, m, source = self.of(case), self.source.model, self.source
-        zero = [name for name in (*NOT_HAD_FIELDS, "tendon_armature") if np.any(getattr(m, name, 0.0))]
+        m, source = self.source.model, self.source
         is_packed = "package://" in source.text
         why = "--floating" if source.floating else "its meshes" if source.missing or is_packed else ""
-        return {
+        least = LEAST if (m.body_mass[m.jnt_bodyid] == 0.0).any() else None
+        of_file = {"why": why if isinstance(source.origin, Path) else "no file", "least": least}
+        if case is None:
+            return of_file
+        dynamics = self.of(case)
+        zero = [name for name in (*NOT_HAD_FIELDS, "tendon_armature") if np.any(getattr(m, name, 0.0))]
+        return of_file | {
             "first": dynamics.data.qpos.tolist(), "qpos": dynamics.qpos.tolist(), "dofs": dynamics.dofs.tolist(),
             "zero": zero if self.bare else None, "gravity": dynamics.model.opt.gravity.tolist(),
-            "least": LEAST if (m.body_mass[m.jnt_bodyid] == 0.0).any() else None,
             "mass_alone": not rotors(m).any() and (self.bare or not np.any(m.tendon_armature)),
-            "why": why if isinstance(source.origin, Path) else "no file",
         }  # fmt: skip
 
     def of(self, case: Case) -> MujocoDynamics:
