@@ -22,16 +22,8 @@ from .models import place_of_report
 
 AGREE, DIFFER, REFUSED, BROKE = "agree", "differ", "refused", "broke"
 NOT_JUDGED, UNCONFIRMED, ENGINE, ITSELF = "not judged", "unconfirmed", "engine differs", "self-consistent"
-VERDICTS = (
-    DIFFER,
-    BROKE,
-    NOT_JUDGED,
-    UNCONFIRMED,
-    ENGINE,
-    REFUSED,
-    ITSELF,
-    AGREE,
-)  # in the order of the table
+# in the order of the table
+VERDICTS = DIFFER, BROKE, NOT_JUDGED, UNCONFIRMED, ENGINE, REFUSED, ITSELF, AGREE
 # of the kinds of checks that fail; exit status 1. An unstable step is a column
 VERDICT_OF = {
     "differing": DIFFER, "broke": BROKE, "not_judged": NOT_JUDGED, "unconfirmed": UNCONFIRMED, "of_engines": ENGINE,

@@ -73,6 +73,7 @@ def test_the_status_is_1_where_a_file_differs(folder, monkeypatch):
 
     monkeypatch.setattr("compare.fleet.run.Run.carried_out", carried_out)
     statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
+    statuses |= {"engine differs": 1, "not judged": 1}
     for verdict, status in statuses.items():
         said.append(verdict)
         assert main(words) == status

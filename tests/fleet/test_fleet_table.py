@@ -13,7 +13,17 @@ import pytest
 from compare.core.cause import Cause
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
-from compare.fleet.table import AGREE, BROKE, DIFFER, ITSELF, NOT_JUDGED, REFUSED, UNCONFIRMED, FileRow
+from compare.fleet.table import (
+    AGREE,
+    BROKE,
+    DIFFER,
+    ENGINE,
+    ITSELF,
+    NOT_JUDGED,
+    REFUSED,
+    UNCONFIRMED,
+    FileRow,
+)
 from compare.report.document import page_of
 from compare.report.verdict import Report, Section
 from compare.robots.arm import ARM
@@ -24,6 +34,7 @@ CAUSES = [CAUSE, dataclasses.replace(CAUSE, text="another")]
 BROKEN = ENDS, None, 0.0, "ended by SIGKILL, 4 times", "equal", About.PROGRAM
 OFF = "limit, observed / predicted - 1", 0.01, 0.001, "", "at most", About.PREDICTION
 STILL = "motion", None, 0.0, "nothing moves", "not judged", About.MODELS
+OTHER = "M", 2.0, 1.0, "", "at most", About.ENGINE
 OWN = AT_OWN_STEP, 0.002, 0.001, "with Euler", "at most", About.STEP
 
 
@@ -59,6 +70,7 @@ def judged(*checks, limits=(), causes=(), reference="arm"):
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), BROKEN, BROKEN], {"causes": CAUSES}, "SIGKILL, 4 times; 1 more"),
     (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
+    (ENGINE, [good(), OTHER], {}, "Other engines: stability: M"), (DIFFER, [good(2.0), OTHER], {"causes": CAUSES}, "another"),
     (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"), (REFUSED, [], {}, "no comparison"),
 ])  # fmt: skip
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
