@@ -50,6 +50,7 @@ class Setup:
     reading: Reading | None = None  # of a robot's file
     quiet: Callable[[], Any] = nothing  # waits until nothing else runs: for timings
     progress: Callable[[str], Any] = nothing  # reports the progress of long work
+    tell: Callable[[str], Any] = nothing  # says what is known before long work ends
     finer: tuple[int, ...] = (1, 16, 128)  # steps of a trajectory, as multiples of the scene's own
     alone: bool = False  # whether the experiment runs by itself, and may take longer than in `all`
     options: Options = field(default_factory=Options)  # of the command line

@@ -149,6 +149,7 @@ def compute(
 
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
         of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
+        of_run["tell"] = terminal.say
         setup = examine.setup_of(compared, options, alone=is_alone, command=command, **of_run)
         terminal.how_far = partial(examine.progress, workers.clock, names)
         run = examine.Run(names, setup, folder, terminal, workers, workers.clock)

@@ -45,18 +45,23 @@ def skipped(robot: Robot) -> Finding | None:
 def rows(setup: Setup) -> EnginesResult:
     """What each installed engine has read, its M, h and accelerations, and the file as it runs there.
 
-    An engine that compiles comes last; what one has found is told when it is known.
+    An engine that compiles, which may take minutes, comes last: what others have found is told before.
     """
     result = EnginesResult("engines", tables={f"engines_{name}": [] for name in TABLES})
     absent: dict[str, list[str]] = {}
     others = [engine for engine in setup.engines.values() if isinstance(engine, Outside)]
-    for engine in sorted(others, key=lambda engine: engine.record.compiles):
+    for engine in others:
         if reason := engine.unavailable():
             absent.setdefault(reason, []).append(LABELS[engine.name])
-            continue
+    others = sorted(
+        (engine for engine in others if not engine.unavailable()), key=lambda engine: engine.record.compiles
+    )
+    for number, engine in enumerate(others, 1):
         result.answers[LABELS[engine.name]] = {}
         compare_engine(result, setup, engine)
-        add_answer(result, setup, engine.record)
+        row = add_answer(result, engine.record)
+        if any(other.record.compiles for other in others[number:]):
+            setup.tell(say(result.finding("engine", row=row)))
     for reason, labels in absent.items():
         result.find("absent", engines=labels, reason=reason)
     verdicts = {label: is_same(answer) for label, answer in result.answers.items()}
@@ -76,13 +81,13 @@ def is_same(answer: dict[str, Any]) -> bool | None:
     return not reads["rows"] and not answer["equations"]["differ"] and is_run
 
 
-def add_answer(result: EnginesResult, setup: Setup, record: EngineRecord) -> None:
-    """The row of an engine, and its sentence."""
+def add_answer(result: EnginesResult, record: EngineRecord) -> AnswerRow:
+    """The row of an engine."""
     answer, label = result.answers[record.label], record.label
     cells = [say(result.finding(f"cell_{cell}", answer=answer)) for cell in ("reads", "equations", "runs")]
     row = AnswerRow(label, record.precision, *cells)
     result.tables["engines_answer"].append(row)
-    setup.progress(say(result.finding("engine", row=row)))
+    return row
 
 
 def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None:

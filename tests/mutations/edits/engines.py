@@ -7,6 +7,7 @@ EDITS = (
     ("experiments.engines", "compare_quantity", "record.eps", "1.2e-07", "every engine is judged as float32"),
     ("experiments.engines", "is_same", "not answer['equations']['differ']", "True", "other equations are said to be the same"),
     ("experiments.engines", "is_same", "not reads['rows']", "True", "other numbers are said to be the same"),
+    ("experiments.engines", "rows", "other.record.compiles", "False", "what one engine has found is said at the end alone"),
     ("experiments.engines", "add_runs", "last.over", "runs[0].over", "a solver that has not converged is the engine's error"),
     ("engines.readings", "CHECKED", "('mass', 'inertia')", "('inertia',)", "a wrong mass is only listed"),
     ("engines.readings", "compare_numbers", "FACTOR * record.eps * _1", "1e9 * _1", "numbers as read: 64 -> 1e9"),
