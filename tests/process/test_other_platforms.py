@@ -70,4 +70,4 @@ def test_a_run_passes_and_an_interrupt_ends_one(elsewhere, tmp_path):
     run.stdout.readline()
     end = ended(run, "SIGINT")
     assert end.status == 2 and len(end.lines) == 1 and "interrupted" in end.lines[0]
-    assert not (tmp_path / "new").exists()
+    assert not list(tmp_path.glob("new/.new-*"))  # nothing half written
