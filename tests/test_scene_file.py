@@ -107,7 +107,7 @@ def test_a_posture_of_a_case_has_a_quaternion_of_length_1(length, accepted):
 @posix
 def test_a_pipe_is_never_waited_for(tmp_path):
     os.mkfifo(tmp_path / "my.toml")
-    with pytest.raises(SceneError, match=r"my\.toml is not a regular file"):
+    with pytest.raises(SceneError, match=r"my\.toml .*not a regular file"):
         read_scenes(tmp_path / "my.toml", ARM)
 
 

@@ -4,6 +4,7 @@ import csv
 import json
 import tomllib
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -58,11 +59,8 @@ def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict
     dt: s, the step of the file, of which the times may be MOST_STEPS. SceneError, in one line with the column or
     the row, for what is no table of such numbers.
     """
-    if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
-        raise SceneError(f"cannot read the controls of {path}: it is not a regular file")
     try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = [line for line in csv.reader(file) if any(cell.strip() for cell in line)]
+        lines = [line for line in csv.reader(regular(path).splitlines()) if any(cell.strip() for cell in line)]
     except (OSError, ValueError, csv.Error) as error:
         raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
     names, rows = [name.strip() for name in lines[0]] if lines else [], lines[1:]
@@ -74,41 +72,41 @@ def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict
             raise SceneError(f"{path}: there is no actuator {name}; expected {known}")
     if "time" not in names or len(names) < 2 or not rows:
         raise SceneError(f"{path}: expected a column time, one of at least one actuator, and rows of numbers")
-    table = np.zeros((len(rows), len(names)))
+    table = np.full((len(rows), len(names)), np.nan)
     for number, row in enumerate(rows):
-        where = f"{path}, row {number + 1}"
         if len(row) != len(names):
-            raise SceneError(f"{where}: {len(row)} cells; expected {len(names)}")
+            raise SceneError(f"{path}, row {number + 1}: {len(row)} cells; expected {len(names)}")
         for column, cell in enumerate(row):
-            try:
+            with suppress(ValueError):
                 table[number, column] = float(cell)
-            except ValueError:
-                table[number, column] = np.nan
-            if not np.isfinite(table[number, column]):
-                raise SceneError(f"{where}: {names[column]} is {shown(cell)}; expected a number")
+    for number, column in np.argwhere(~np.isfinite(table)).tolist()[:1]:
+        cell = shown(rows[number][column])
+        raise SceneError(f"{path}, row {number + 1}: {names[column]} is {cell}; expected a number")
     columns = dict(zip(names, table.T))
     times = columns["time"]
     if times[0] != 0.0 or len(times) < 2:
-        raise SceneError(
-            f"{path}: time begins at {times[0]:g}, {len(times)} rows; expected two rows at least, from 0 on"
-        )
-    falls = np.flatnonzero(np.diff(times) <= 0.0)
-    if len(falls):
-        raise SceneError(
-            f"{path}, row {falls[0] + 2}: time does not rise ({times[falls[0] + 1]:g} after {times[falls[0]]:g} s)"
-        )
+        begins = f"time begins at {times[0]:g}, {len(times)} rows"
+        raise SceneError(f"{path}: {begins}; expected two rows at least, from 0 on")
+    for k in np.flatnonzero(np.diff(times) <= 0.0).tolist()[:1]:
+        falls = f"{times[k + 1]:g} after {times[k]:g} s"
+        raise SceneError(f"{path}, row {k + 2}: time does not rise ({falls})")
     if times[-1] / dt > MOST_STEPS:
         steps = f"{times[-1] / dt:.2g} steps of {1e3 * dt:g} ms; expected {MOST_STEPS} at most"
         raise SceneError(f"{path}: time ends at {times[-1]:g} s, which are {steps}")
     return columns
 
 
+def regular(path: str | Path) -> str:
+    """The text of a regular file; OSError for another: a pipe may be waited for without end."""
+    if Path(path).exists() and not Path(path).is_file():
+        raise OSError("it is not a regular file")
+    return Path(path).read_text(encoding="utf-8-sig")
+
+
 def entries_of(path: str | Path) -> list[dict[str, Any]]:
     """The tables [[scene]] of a file; SceneError if it has none, or anything else."""
-    if Path(path).exists() and not Path(path).is_file():  # a pipe may be waited for without end
-        raise SceneError(f"{path} is not a regular file; expected a TOML file")
     try:
-        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        content = tomllib.loads(regular(path))
     except (OSError, ValueError, RecursionError) as error:  # TOML's and Unicode's errors are ValueErrors
         why = "it is nested too deep" if isinstance(error, RecursionError) else " ".join(str(error).split())
         raise SceneError(f"{path} is not a TOML file that can be read: {why}") from None
