@@ -91,7 +91,7 @@ def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
 
     states: at which M and h agree without the causes; 0: that is not known.
     """
-    from .examine import lines_of
+    from .examine import SHOWN, lines_of
 
     failing = failures(report.sections)
     verdict = report.verdict.split("\n")[: 2 if failing.unstable else 1]
@@ -101,9 +101,10 @@ def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
     mended = [block("run", "mended", states=states)] if states else []
     if not is_alone:
         return [*verdict, *mended, *others]
+    causes = [line for cause in report.causes[:SHOWN] for line in lines_of(cause)]
     if report.answers_first:
-        return [*report.answer, *(verdict[-1:] if failing.differing or failing.broke else []), *others]
-    causes = [line for cause in report.causes for line in lines_of(cause)]
+        differs = [*verdict[-1:], *causes] if failing.differing or failing.broke else []
+        return [*report.answer, *differs, *others]
     checks = [f"  {check}" for check in failing.differing[:MOST_FAILING]] if not causes else []
     section = report.sections[0]
     has_number = section.result.headline and (section.record.compares or not causes)
