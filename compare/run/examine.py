@@ -28,10 +28,9 @@ from .reference import Compared
 
 Value = TypeVar("Value")
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
-# the numbers on which Mbar and h depend, by their names in `parameters`
-OF_JOINTS, OF_BODIES = ("order", "parent", "ref", "axis", "anchor"), ("com", "mass", "inertia")
 SHOWN = 3  # causes on the terminal
-IN_EQUATIONS = (*OF_JOINTS, *OF_BODIES, "gravity", "armature", "flag gravity")
+# the numbers on which Mbar and h depend, by their names in `parameters`
+IN_EQUATIONS = ("order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity")
 
 
 class Examined(NamedTuple):
@@ -93,8 +92,7 @@ class Run:
         self.clock.ends(START)
         needless = {}
         for name in self.order:
-            reason = self.needless(name)
-            if reason:
+            if reason := self.needless(name):
                 needless[name] = reason
                 self.clock.ends(name)
             else:
@@ -173,9 +171,8 @@ class Run:
             seconds = self.clock.seconds_of(section.name)
             self.terminal.say(block("run", "outcome", name=section.name, seconds=seconds, **about), style)
             if failing.differing and not is_said:
-                lines = [line for cause in self.causes[:SHOWN] for line in lines_of(cause)]
-                if len(self.causes) > SHOWN:
-                    lines.append(f"  {block('run', 'more', count=len(self.causes) - SHOWN)}")
+                lines, more = [line for cause in self.causes[:SHOWN] for line in lines_of(cause)], len(self.causes) - SHOWN
+                lines += [f"  {block('run', 'more', count=more)}"] if more > 0 else []
                 for line in lines or [f"  first: {failing.differing[0]}"]:
                     self.terminal.say(line)
                 is_said = True
