@@ -80,7 +80,7 @@ def ended_by_signals(run: Callable[[], int], is_own: bool = False) -> int:
         end_group(child.pid or 0)
     child.kill()
     child.join()
-    if "end" in told and told["end"] is not None:
+    if told.get("end") is not None:
         return int(told["end"])
     if "end" not in told and "folder" in told:
         unfinished, made = told["folder"]
@@ -102,8 +102,7 @@ def hear(pipe: Connection, child: BaseProcess, told: dict[str, Any], kind: str, 
         while not told.keys() & {kind, "end"} and time.monotonic() < until:
             is_there = child.is_alive()
             if pipe.poll(POLL):
-                name, what = pipe.recv()
-                told[name] = what
+                told.update([pipe.recv()])
             elif not is_there:
                 return
 
