@@ -130,8 +130,6 @@ class Explanations:
         closest = min(fits, key=lambda fit: fit.left_over, default=None)
         return closest.cause if closest and closest.left_over < NEAREST and closest.is_possible else None
 
-    # stages
-
     def stages(self) -> Iterator[list[Cause]]:
         """Explanations of everything: the natural ones of each stage, if there are any; then the others.
 
@@ -158,7 +156,8 @@ class Explanations:
 
     def groups(self) -> Iterator[Cause]:
         """The ten numbers of a body, the same number of all, the components of an offset or a CoM."""
-        return several(self.equations, self.search.expanded(self.hypotheses(numbers)), self.search)
+        if any(several(self.at_few, self.family(numbers), self.few)):
+            yield from several(self.equations, self.search.expanded(self.hypotheses(numbers)), self.search)
 
     def of_parts(self) -> list[Cause]:
         """Slips in some parts alone, in all that differ."""

@@ -43,7 +43,8 @@ def edits(equations: Equations) -> Iterator[Hypothesis]:
         for edit in of_kind(equations):
             moved: dict[Path, float] = {}
             for name, field in edit[2].items():
-                moved |= {Path(name, at): x for at, x in np.ndenumerate(field - stated[name]) if x}
+                changed = np.argwhere(field != stated[name]).tolist()
+                moved |= {Path(name, at := tuple(k)): float(field[at] - stated[name][at]) for k in changed}
             if moved:
                 chosen.setdefault(tuple((path, f"{x:.12g}") for path, x in moved.items()), (cost, edit, moved))
     every = list(chosen.values())

@@ -55,10 +55,14 @@ def entries_of_M(equations: Equations) -> dict[str, list[int]]:
     """Each entry of Mbar, and those that couple two joints of several speeds, by their names."""
     places, tree = list(zip(*equations.layout.places)), equations.tree
     sets = {entry.named(equations.speeds): [k] for k, entry in enumerate(equations.entries[equations.in_M])}
-    for (first, rows), (second, columns) in combinations_with_replacement(speeds_of_joints(tree).items(), 2):
-        if max(len(rows), len(columns)) > 1:
-            inside = [k for k, pair in enumerate(places) if is_between(pair, rows, columns)]
-            sets[f"M[{first}][{second}]"] = inside
+    for one, other in combinations_with_replacement(speeds_of_joints(tree).items(), 2):
+        if max(len(one[1]), len(other[1])) > 1:
+            inside = [k for k, pair in enumerate(places) if is_between(pair, one[1], other[1])]
+            sets[f"M[{one[0]}][{other[0]}]"] = inside
+            for (first, rows), (second, columns) in ((one, other), (other, one)):
+                if not equations.layout.is_symmetric and one != other:  # each block by itself
+                    block = [k for k in inside if places[k][0] in rows and places[k][1] in columns]
+                    sets[f"M[{first}][{second}]"] = block
     return sets
 
 
