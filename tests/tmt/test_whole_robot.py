@@ -83,7 +83,7 @@ def test_each_has_the_digits_of_50(name, rng):
 
 
 JOINTS = [
-    tmt.Joint("base", "free", mass=2.0, inertia=(0.1, 0.2, 0.15)),
+    tmt.Joint("base", "free", offset=(0.2, 0.1, 0.5), mass=2.0, inertia=(0.1, 0.2, 0.15)),
     tmt.Joint("hip", offset=(0.1, 0.0, -0.2), axis=(0.0, 1.0, 0.0), damping=0.3),
     tmt.Joint("leg", axis=(1.0, 0.0, 0.0), mass=0.7, com=(0.0, 0.0, -0.2), inertia=(0.02, 0.03, 0.02, 0.002, 0.001, 0.003)),
     tmt.Joint("eye", "ball", parent="base", offset=(0.3, 0.0, 0.0), mass=0.1, com=(0.0, 0.01, 0.0), inertia=np.eye(3) * 1e-3),
@@ -105,6 +105,9 @@ def test_a_tree_written_joint_by_joint_is_that_of_the_same_file(rng):
     assert (written.nq, written.nv) == (read.nq, read.nv) == (14, 12)
     assert written.joint_names[:5] == ("base x", "base y", "base z", "base turn", "hip")
     q, qd, tau = random_states(rng, read, 3)
+    shift = np.zeros(read.nq)
+    shift[:3] = 0.2, 0.1, 0.5  # MuJoCo has the place itself as coordinates
+    assert np.allclose(tmt.com(written, q - shift), tmt.com(read, q), atol=1e-14)
     found, expected = (tmt.acceleration(tree, q, qd, tau) for tree in (written, read))
     assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
 
@@ -126,3 +129,5 @@ def test_the_energy_of_a_run_that_ended_early_is_nan_from_there_on():
     motion = tmt.simulate(tmt.ARM, [0.5, 0.3, 1.0], [1e200, 0.0, 0.0], np.zeros(3), 0.1, 4)
     energy = tmt.energy(tmt.ARM, motion.q, motion.qd)
     assert motion.ended and (np.isnan(energy) == np.isnan(motion.q[:, 0])).all() and not np.isnan(energy[0])
+    with pytest.raises(ValueError, match="finite"):
+        tmt.energy(tmt.ARM, [0.0, np.nan, 0.0], np.zeros(3))
