@@ -93,5 +93,5 @@ EDITS = (
     ("dynamics", "energy", "np.isnan(positions).all(axis=-1, keepdims=True)",
      "np.isnan(positions).any(axis=-1, keepdims=True)", "a state with one NaN has no energy and no error"),
     ("agreement.comparison", "Comparison.values", "C + C.swapaxes(1, 2)", "2.0 * C", "a Coriolis matrix must be symmetric"),
-    ("agreement.why", "of_coriolis", "comparison.coriolis.swapaxes(1, 2)", "comparison.coriolis", "a transposed matrix is not told"),
+    ("agreement.why", "of_coriolis", "comparison.coriolis.swapaxes(1, 2)", "comparison.coriolis", "a transpose is not told"),
 )  # fmt: skip
