@@ -253,4 +253,7 @@ class Entries:
         for k in range(1, 5):
             term = dt / k * (rates @ term)
             carried = carried + term
-        return (carried + dt * (carried @ sizes @ carried))[:, : 2 * nv]
+        carried = carried + dt * (carried @ sizes @ carried)
+        for ball in self.tree.coordinates.balls:  # products of quaternions, which cancel down to a small turn
+            carried[:, ball.qd, ball.qd] += 1.0
+        return np.asarray(carried[:, : 2 * nv])

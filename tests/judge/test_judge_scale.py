@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 from trees import one_body
 
 import tmt
@@ -187,6 +188,20 @@ def test_the_scale_of_a_step_is_carried_through_its_exponential(dt):
     expected = carried + dt * carried @ [[0.0, 1.0, 0.0], [30.0, 7.0, 11.0], [0.0, 0.0, 0.0]] @ carried
     found = entries.Entries(spring, np.zeros((1, 1))).step(dt, (*by, None, None), (*sizes, None, None))
     assert np.allclose(found[0], expected[:2], rtol=1e-4, atol=0.0)
+
+
+@pytest.mark.parametrize("dt", [1e-4, 0.02])
+def test_the_derivatives_of_a_small_turn_are_judged_as_products_of_quaternions(dt):
+    """Of a sphere that spins freely: exp(-dt [w]) by SciPy; rounding is of sums of 1, however small a turn is."""
+    sphere, spin = one_body(np.eye(3), ("ball",), gravity=(0.0, 0.0, 0.0)), np.array([0.98, 1.2, 0.87])
+    turns = np.random.default_rng(7).normal(size=(200, 4))
+    q, qd = turns / np.linalg.norm(turns, axis=1, keepdims=True), np.tile(spin, (200, 1))
+    A, _ = tmt.step_derivatives(sphere, q, qd, np.zeros_like(qd), dt, "semi_implicit_euler")
+    of, by = entries.Entries(sphere, q, qd), tmt.derivatives(sphere, q, qd, np.zeros_like(qd))
+    sizes = of.step(dt, by, of.derivatives(0.0, np.zeros_like(qd), by))[:, :3, :3]
+    difference = np.abs(A[:, :3, :3] - Rotation.from_rotvec(-dt * spin).as_matrix())
+    assert difference.max() > 0.0 and (difference <= 64 * 2.0**-52 * sizes).all()
+    assert sizes.min() >= 1.0 and sizes.max() <= 2.0 + 10.0 * dt
 
 
 def test_errors_go_through_the_inverse_entry_by_entry():

@@ -78,6 +78,7 @@ EDITS = (
     ("judge.entries", "Entries.force_rates", "by_movement + stiffness", "10 * _0", "the scale of a derivative by q x 10"),
     ("judge.entries", "Entries.force_rates", "2.0 * by_speed + damping", "100 * _0", "the scale of a derivative by qd x 100"),
     ("judge.entries", "Entries.step", "carried + _1", "10 * _0", "the scale of a step x 10", 2),
+    ("judge.entries", "Entries.step", "1.0", "0.0", "the small turn of a ball is judged as if no terms of 1 were added"),
     ("judge.entries", "Entries.energy", "_1 / 2.0", "10 * _0", "the kinetic energy's scale x 10"),
     ("judge.entries", "Entries.potential_energy", "stretched.sum(axis=1) / 2.0", "50 * _0", "the energy of springs x 50"),
     ("judge.entries", "Entries.springs", "spring_scale(_1, _2)", "10 * _0", "the springs' scale x 10"),
