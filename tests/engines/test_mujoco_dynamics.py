@@ -26,6 +26,42 @@ def test_a_run_of_a_robot_in_another_order_than_its_file_is_that_of_tmt(tmp_path
         assert np.allclose(compiled[name], stated[name], atol=1e-14), name
 
 
+FIXED_AND_MOVING = """
+<mujoco><worldbody>
+<body name="post" pos="5 0 0"><geom size=".1" mass="7"/><body name="flag" pos="0 1 0"><joint axis="1 2 0" pos=".1 0 0"/>
+  <geom size=".1" mass="2"/><body pos="0 .3 .2"><geom size=".2" mass="1"/></body></body></body>
+<body name="target" mocap="true" pos="0 0 2"><geom size=".1" mass="11"/><body pos="0 0 1"><geom size=".1" mass="3"/></body>
+  <body name="on target" pos="1 0 0"><joint axis="0 1 0"/><geom size=".1" mass="2.5" pos="0 0 .2"/></body></body>
+<body name="loose" pos="0 -2 0"><freejoint/><geom type="box" size=".1 .2 .3" mass="4" pos=".1 0 0"/></body>
+</worldbody></mujoco>"""
+
+
+def test_what_is_fixed_to_the_world_or_to_a_mocap_body_is_no_part_of_the_centre_of_mass(rng):
+    """Bodies by their names, and the momentum of each from MuJoCo's velocities of bodies, xipos, ximat and inertia."""
+    found, model = read(FIXED_AND_MOVING), plain.MjModel.from_xml_string(FIXED_AND_MOVING)
+    dynamics, data = engine(found).of(robot_of(found, "a place").case()), plain.MjData(model)
+    first = model.body("flag").id
+    moving = [first, first + 1, model.body("on target").id, model.body("loose").id]
+    q, v = data.qpos + rng.uniform(-0.5, 0.5, model.nq), rng.uniform(-1.0, 1.0, model.nv)
+    plain.mj_normalizeQuat(model, q)
+    data.qpos[:], data.qvel[:] = q, v
+    plain.mj_forward(model, data)
+    mass, places = model.body_mass[moving], data.xipos[moving]
+    com = mass @ places / mass.sum()
+    linear, angular = np.zeros((2, 3))
+    for body, m, place in zip(moving, mass, places):
+        velocity = np.zeros(6)
+        plain.mj_objectVelocity(model, data, plain.mjtObj.mjOBJ_BODY, body, velocity, 0)
+        R = data.ximat[body].reshape(3, 3)
+        linear += m * velocity[3:]
+        angular += m * np.cross(place - com, velocity[3:])
+        angular += R @ (model.body_inertia[body] * (R.T @ velocity[:3]))
+    expected = np.concatenate([linear, angular])
+    assert np.allclose(dynamics.com(q), com, atol=1e-13)
+    assert np.allclose(dynamics.com_jacobian(q) @ v, linear / mass.sum(), atol=1e-13)
+    assert np.allclose(dynamics.centroidal_momentum_matrix(q) @ v, expected, atol=1e-12)
+
+
 @pytest.mark.skipif(runs.library() is None, reason="MuJoCo's library is elsewhere")
 def test_a_loop_repeats_its_calls_at_a_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)

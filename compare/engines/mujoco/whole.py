@@ -12,9 +12,8 @@ class Whole:
     """Its methods take data of which mj_comPos is done. What never moves does not count."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        self.model, bodies = model, np.arange(model.nbody)
-        hangs = (model.body_weldid == bodies) & (model.body_weldid[model.body_parentid] == 0)
-        self.trees = bodies[1:][hangs[1:]]
+        self.model, moves = model, model.body_treeid >= 0  # no tree: the world, mocap bodies, what is fixed to them
+        self.trees = np.flatnonzero(moves & ~moves[model.body_parentid])
         self.masses = model.body_subtreemass[self.trees]
         self.shares = self.masses / self.masses.sum()
 
