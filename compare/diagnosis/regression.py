@@ -60,7 +60,7 @@ def several(equations: Equations, family: Family, search: Search) -> Iterator[Ca
         added = added * [one.size for one in those]
         if field == "body" and determined[active].any():
             yield from of_body(equations, owner, those, added, determined, active)
-        elif determined.any() and all(one.is_possible(x) for one, x in zip(those, added)):
+        elif determined.any():
             yield from as_cause(equations, those, added)
 
 
@@ -161,7 +161,8 @@ def as_cause(
     pairs = [
         (one.cause, one.value(x)) for one, x in zip(those, changes) if abs(x) > SMALL * sizes[one.cause.unit]
     ]
-    if len(pairs) < 2 or not all(is_written(x, float(cause.stated)) for cause, x in pairs):
+    are_possible = all(one.is_possible(x) for one, x in zip(those, changes))
+    if len(pairs) < 2 or not (are_possible and all(is_written(x, float(cause.stated)) for cause, x in pairs)):
         return
     names = [cause.place.partition(" of ") for cause, _ in pairs]
     if len({owner for *_, owner in names}) == 1:

@@ -195,6 +195,13 @@ def test_a_load_is_named_with_its_mass_and_place():
     assert explains.startswith("0.4 kg, CoM (0.3, 0.02, 0.01) m, xx 0.001, yy 0.002, zz 0.003")
 
 
+def test_several_moments_of_inertia_below_zero_are_no_cause():
+    for size, is_cause in ((0.5, True), (-3.0, False)):
+        tree = replace(ARM)
+        object.__setattr__(tree, "inertia", [ARM.inertia[0], (TENSOR * [[1.0], [size], [size]]).tolist()])
+        assert any(cause.kind == "several" for cause in of_parts(ARM, *parts(tree)).causes) is is_cause
+
+
 @pytest.mark.parametrize("tree", READ.values(), ids=READ)
 def test_the_recursion_without_a_slip_is_the_method(tree):
     equations = Equations(tree, *states(tree), Layout(len(tree.axis), True, False))
