@@ -17,7 +17,7 @@ from compare.cli import command_line
 from compare.core.check import Result
 from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
-from compare.experiments.options import Options
+from compare.experiments.options import AllOptions, Options
 from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
@@ -81,6 +81,17 @@ def test_what_raises_is_one_failed_check(tmp_path, capsys, monkeypatch):
         assert check.items() >= expected.items()
         assert error in check["note"]
     assert f"Not finished: {next(iter(BROKEN))}" in out and f"; {len(failed) - 1} more." in out
+
+
+@pytest.mark.parametrize("asked, run", [
+    ({}, set()), ({"write": "small.xml"}, {"reduction"}), ({"engines": "drake"}, {"engines"}), ({"out": "elsewhere"}, set()),
+])  # fmt: skip
+def test_a_quick_run_of_a_larger_robot_has_the_long_experiments_that_an_option_asks_for(asked, run):
+    robot = SimpleNamespace(coordinates=SimpleNamespace(nv=9))
+    setup = SimpleNamespace(robot=robot, options=AllOptions(**asked), alone=False, is_quick=True)
+    late = "reduction", "engines", "derivatives"
+    parts = experiment.Run([*late, "mass"], setup, None, Terminal(), None, Clock())
+    assert {name for name in parts.names if not parts.too_long(name)} == {"mass", *run}
 
 
 def test_a_report_that_cannot_be_made_is_one_line_and_the_earlier_one_is_whole(tmp_path, capsys, monkeypatch):

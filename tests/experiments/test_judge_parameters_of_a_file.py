@@ -86,6 +86,14 @@ def test_an_axis_of_the_opposite_sense_is_a_convention_and_is_said(compiled, ran
     assert {"opposite sign" in cause.text for cause in causes} == {is_said}
 
 
+def test_numbers_that_differ_are_counted_apart_from_those_that_an_option_changes():
+    result = Result("parameters")
+    for compiled, asked_by in ((2.0, ""), (2.0, "settotalmass"), (0.5, "settotalmass"), (1.0, "")):
+        result.rows += rows_of(Stated("arm", "mass", 1.0, compiled), "kg", asked_by)
+    values = parameters.headline(result).values
+    assert (values["numbers"], values["off"], values["changed"]) == (2, 1, 2)
+
+
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():
     mass = compare_number(Result("parameters"), Stated("arm", "mass", 2.0, 2.5), "kg")
     (cause,) = causes_of([mass], ("robot.xml", "right.xml"))
@@ -120,6 +128,7 @@ def beside_solution(tmp_path, text, solution=CART):
     ('mass="2"', 'mass="3"', [("mass of cart", 2, 3)]), ('axis="1 0 0"', 'axis="-1 0 0"', [("axis x of x", 1, -1)]),
     ('springref="0.2"', 'springref="0.3"', [("rest of tilt", 0.2, 0.3)]),
     ('damping="0.5"', 'damping="0.5" frictionloss="0.1"', [("frictionloss", 0, 1)]), ('<motor joint="x"/>', "", []),
+    ('damping="0.5"', 'damping="0.5" springref="0.3"', []),  # of no spring
     ('stiffness="3"', 'stiffness="3" limited="true" range="-1 1"', []),  # may be others
     (' name="tilt"', "", []), ('"pole"', '"stick"', []), ("<mujoco>", "<mujoco>", []),  # a file is its own solution
 ])  # fmt: skip

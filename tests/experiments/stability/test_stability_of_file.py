@@ -8,11 +8,13 @@ from edited import setup_of_file
 
 from compare.core.check import AT_OWN_STEP, AT_REQUESTED_STEP
 from compare.core.text import say, screen
+from compare.engines.mujoco import read
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.experiments import stability
 from compare.experiments.options import StabilityOptions
 from compare.experiments.setup import Setup
 from compare.experiments.stability import of_file
+from compare.robots.scene_file import SceneError
 from compare.stability.answer import StepLimitRow
 
 TURNING = """<mujoco><option timestep="{dt}"/><worldbody><body><joint name="turn" axis="0 0 1"/>
@@ -164,3 +166,16 @@ def test_recorded_controls_are_judged():
     times = np.linspace(0.0, 0.5, 26)
     result = found_of(recorded={"time": times, "actuator 0": np.sin(9.0 * times)})
     assert result.tables["step_limits"][0].controls == "record" and result.checks[0].passed
+
+
+@pytest.mark.parametrize("dt, is_refused", [(None, False), (1e-3, False), (1.1e-5, False), (0.9e-5, True)])
+def test_recorded_controls_may_be_as_long_as_100_000_of_the_steps_that_are_asked_for(tmp_path, dt, is_refused):
+    path = tmp_path / "long.csv"
+    path.write_text("time,push\n0,0\n1,0.1\n")
+    reading = read(TURNING.format(dt=0.002, actuator=MOTOR.replace("<motor", '<motor name="push"')))
+    options = StabilityOptions(controls=str(path), dt=dt)
+    if is_refused:
+        with pytest.raises(SceneError, match=r"steps of 0\.009 ms"):
+            options.validated(reading, "turning")
+    else:
+        assert options.validated(reading, "turning").recorded["push"].tolist() == [0.0, 0.1]

@@ -26,4 +26,4 @@ EDITS = (
     ("engines.outside", "OutsideDynamics.at", "tau - passive(*_1)", "tau", "damping is forgotten"),
     ("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
     ("mujoco.whole", "Whole.__init__", "model.body_treeid >= 0", "model.body_weldid > 0", "a mocap body is a part of the whole"),
-)
+)  # fmt: skip

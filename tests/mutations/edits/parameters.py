@@ -77,4 +77,8 @@ EDITS = (
     ("states", "check_wide", "least >= largest", "least >= 1e9 * largest", "accelerations that rounding hides are judged"),
     ("states", "energy_rate", "_1 + method.spring_energy(*_2)", "_1", "springs store nothing"),
     ("states", "headline", "max(*_1)", "min(*_1)", "the headline has the best"),
+    ("parameters", "numbers_of", "numbers['rest'] * _1", "numbers['rest']", "where a joint without spring rests is compared"),
+    ("parameters", "headline", "_1 - off", "_1", "numbers that differ are counted as changed by an option"),
+    ("experiments.options", "MotionOptions.validated", "dt or reading.dt", "reading.dt", "controls last by the file's step"),
+    ("experiments.options", "asked_alone", "{'engines', 'write'}", "{'engines'}", "a quick run does not write the smaller model"),
 )  # fmt: skip
