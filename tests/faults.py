@@ -85,7 +85,9 @@ def with_sine_for_cosine(tree: tmt.Tree, q, qd, axis: int):
     moved, (T, _) = q.copy(), literal.jacobians(tree, q)
     moved[:, 0] = np.pi / 2.0 - q[:, 0]
     right, wrong = T[:, 0], T[:, 0].copy()
-    wrong[:, axis] = literal.jacobians(tree, moved)[0][:, 0, axis] * (1.0 - 2.0 * (np.arange(len(tree.axis)) == 0))
+    wrong[:, axis] = literal.jacobians(tree, moved)[0][:, 0, axis] * (
+        1.0 - 2.0 * (np.arange(len(tree.axis)) == 0)
+    )
     force = tree.mass[0] * (literal.convective_terms(tree, q, qd)[0][:, 0] - np.array(tree.gravity))
     inertias = (tree.mass[0] * np.swapaxes(J, 1, 2) @ J for J in (wrong, right))
     return M + next(inertias) - next(inertias), h + np.einsum("sci,sc->si", wrong - right, force)

@@ -107,7 +107,10 @@ def test_torques_that_act_with_gears_are_one_cause_in_words(folder):
     geared = "lambda q, v, tau: acceleration(q, v, [25.0, 2.0] * tau)"
     (folder / "gears.py").write_text(f"from mine import *\n\ngears = changed(acceleration={geared})\n")
     (cause,) = examined(folder, "gears.py:gears", ["acceleration", "diagnosis"]).causes
-    said = ("tau of hip: your acceleration takes 25 times it", "tau of knee: your acceleration takes 2 times it")
+    said = (
+        "tau of hip: your acceleration takes 25 times it",
+        "tau of knee: your acceleration takes 2 times it",
+    )
     assert all(part in cause.text for part in said)
 
 

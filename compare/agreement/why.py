@@ -217,12 +217,16 @@ def of_inputs(names: tuple[str, ...], factors: ndarray, left_over: LeftOver, rat
     wrong = [(names[j], names[i] if i != j else "", float(factors[i, j])) for i, j in off]
     text = f"{say(Finding('agreement', 'inputs', {'factors': wrong}))} {left_over.sentence()}".strip()
     places = [f"tau of {name}{f' at {at}' * bool(at)}" for name, at, _ in wrong]
-    stated, explains = (", ".join(map("{:.7g}".format, x)) for x in zip(*((float(not at), x) for _, at, x in wrong)))
+    stated, explains = (
+        ", ".join(map("{:.7g}".format, x)) for x in zip(*((float(not at), x) for _, at, x in wrong))
+    )
     cause = Cause(
         rank=2, kind="input", place=" and ".join(places), stated=stated, explains=explains, unit="times",
         text=text.removesuffix("."),
     )  # fmt: skip
-    return Why(text, left_over.ratio <= 1.0 or bool(left_over.causes), Diagnosis(False), (cause,), text, ratio)
+    return Why(
+        text, left_over.ratio <= 1.0 or bool(left_over.causes), Diagnosis(False), (cause,), text, ratio
+    )
 
 
 def of_needed_forces(given: Given, left_over: LeftOver) -> Why:

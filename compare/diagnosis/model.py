@@ -198,5 +198,3 @@ def whole(numbers: ndarray) -> ndarray:
 def vectors(rows: Sequence[Sequence[Vector]], count: int) -> ndarray:
     """Vectors of scalars or (count,), as an array (rows, columns, count, 3)."""
     return np.array([[[np.broadcast_to(x, count) for x in v] for v in row] for row in rows]).swapaxes(2, 3)
-
-

@@ -55,7 +55,10 @@ def several(equations: Equations, family: Family, search: Search) -> Iterator[Ca
         if field == "body":  # first with the mass and the CoM as stated
             of_tensor, is_known = regressed(search, family.first[chosen][tensor])
             if is_known.all():
-                added, determined = np.append(np.zeros(len(those) - len(of_tensor)), of_tensor), np.ones(len(those), bool)
+                added, determined = (
+                    np.append(np.zeros(len(those) - len(of_tensor)), of_tensor),
+                    np.ones(len(those), bool),
+                )
         active = np.abs(family.first[chosen]).max(axis=(1, 2)) > 0.0
         added = added * [one.size for one in those]
         if field == "body" and determined[active].any():
@@ -114,8 +117,12 @@ def of_body(
         is_body = not is_known or np.linalg.eigvalsh(tensor)[0] >= -ZERO * mass
         if is_body and all(map(is_round, (mass, *place))):
             where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(place) < ZERO, 0.0, place))
-            shown = [f", {name} {tensor[i, j]:.4g}" for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass]
-            explains = f"{mass:.5g} kg, CoM ({where}) m" + "".join([*shown, " kg m2"] if is_known and shown else [])
+            shown = [
+                f", {name} {tensor[i, j]:.4g}" for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass
+            ]
+            explains = f"{mass:.5g} kg, CoM ({where}) m" + "".join(
+                [*shown, " kg m2"] if is_known and shown else []
+            )
             on = f"a load on {equations.tree.body_names[b]}"
             yield Cause(rank=3, kind="numbers", place=on, stated="", explains=explains, cost=SEVERAL)
             return
@@ -183,7 +190,9 @@ def merged(names: list[str]) -> list[str]:
     """Names that begin alike as one: "CoM x", "CoM z" as "CoM x", "z"."""
     firsts = [name.rpartition(" ")[0] for name in names]
     pairs = zip(names, firsts, ["", *firsts])
-    return [name.removeprefix(f"{first} ") if first and first == before else name for name, first, before in pairs]
+    return [
+        name.removeprefix(f"{first} ") if first and first == before else name for name, first, before in pairs
+    ]
 
 
 # one number beside noise
@@ -217,7 +226,12 @@ def through_noise(tree: Tree, values: Values, qdd: ndarray | None = None) -> Noi
     given = Given(tree, values, None, qdd=qdd)
     equations = given.equations
     search = Search(equations.values, given.packed, given.tolerance)
-    places = [*numbers(equations), *terms(equations), *coefficients(equations), *squares_of_velocities(equations)]
+    places = [
+        *numbers(equations),
+        *terms(equations),
+        *coefficients(equations),
+        *squares_of_velocities(equations),
+    ]
     family = search.expanded(places)
     first, second = family.first * search.weight, family.second * search.weight
     count, off = int(search.known.sum()), search.off

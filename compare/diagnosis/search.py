@@ -277,4 +277,3 @@ class Explanations:
             causes = [fit.cause for fit in inner.explained((*COMPLETE, numbers, *FACTORS))]
             for cause in (cause for cause in causes if inner.cost(cause) < NATURAL):
                 yield from self.statements.restated(together([one.cause, cause], 0.0), one.joints)
-

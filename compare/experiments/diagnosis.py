@@ -86,7 +86,9 @@ class Found(NamedTuple):
     def said(self) -> list[Cause]:
         """One of Mbar and h, one of accelerations: the likeliest, and in its text others that explain the same."""
         several = [causes for causes in (self.why.diagnosis.causes, self.why.forces) if causes]
-        return [replace(found[0], text=block("causes", "causes", list=found, most=MOST_SAID)) for found in several]
+        return [
+            replace(found[0], text=block("causes", "causes", list=found, most=MOST_SAID)) for found in several
+        ]
 
     @property
     def share(self) -> float:

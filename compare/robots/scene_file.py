@@ -60,7 +60,9 @@ def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict
     the row, for what is no table of such numbers.
     """
     try:
-        lines = [line for line in csv.reader(regular(path).splitlines()) if any(cell.strip() for cell in line)]
+        lines = [
+            line for line in csv.reader(regular(path).splitlines()) if any(cell.strip() for cell in line)
+        ]
     except (OSError, ValueError, csv.Error) as error:
         raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
     names, rows = [name.strip() for name in lines[0]] if lines else [], lines[1:]

@@ -30,7 +30,19 @@ Value = TypeVar("Value")
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 SHOWN = 3  # causes on the terminal
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = ("order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature", "flag gravity")
+IN_EQUATIONS = (
+    "order",
+    "parent",
+    "ref",
+    "axis",
+    "anchor",
+    "com",
+    "mass",
+    "inertia",
+    "gravity",
+    "armature",
+    "flag gravity",
+)
 
 
 class Examined(NamedTuple):
@@ -171,7 +183,10 @@ class Run:
             seconds = self.clock.seconds_of(section.name)
             self.terminal.say(block("run", "outcome", name=section.name, seconds=seconds, **about), style)
             if failing.differing and not is_said:
-                lines, more = [line for cause in self.causes[:SHOWN] for line in lines_of(cause)], len(self.causes) - SHOWN
+                lines, more = (
+                    [line for cause in self.causes[:SHOWN] for line in lines_of(cause)],
+                    len(self.causes) - SHOWN,
+                )
                 lines += [f"  {block('run', 'more', count=more)}"] if more > 0 else []
                 for line in lines or [f"  first: {failing.differing[0]}"]:
                     self.terminal.say(line)

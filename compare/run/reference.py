@@ -68,7 +68,9 @@ class Reference(NamedTuple):
         """The first lines of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
         first = f"reference: {self.kind}; {self.file} compared with {other}"
-        return tuple(in_one_line(line) for line in (first, self.matched, *self.otherwise, *self.remarks) if line)
+        return tuple(
+            in_one_line(line) for line in (first, self.matched, *self.otherwise, *self.remarks) if line
+        )
 
 
 class Compared(NamedTuple):

@@ -247,7 +247,9 @@ def test_a_slip_of_the_derivation_is_named(kind, place, explains):
 
 
 def test_a_slip_and_a_number_are_named_together():
-    tensor = TENSOR + ARM.mass[1] * (np.dot(ARM.com[1], ARM.com[1]) * np.eye(3) - np.outer(ARM.com[1], ARM.com[1]))
+    tensor = TENSOR + ARM.mass[1] * (
+        np.dot(ARM.com[1], ARM.com[1]) * np.eye(3) - np.outer(ARM.com[1], ARM.com[1])
+    )
     found = of_parts(ARM, *parts(replace(ARM, inertia=(ARM.inertia[0], tensor.tolist()), mass=(1.7, 1.5))))
     pairs = [{part.place for part in cause.parts} for cause in found.causes]
     assert {"mass of upper arm", "inertia of forearm"} in pairs

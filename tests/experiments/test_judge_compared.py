@@ -31,6 +31,8 @@ OF_MUJOCO = [  # the experiment, what is off (of a pair which), the checks of bo
     (kinematics, "convective_terms", {"place": 0}, {"v_conv"}),
     (kinematics, "convective_terms", {"place": 1}, {"w_conv"}), (mass, "mass_matrix", {}, {"Mbar"}),
     (gravity, "gravity_balance", {}, {"holding torque"}), (acceleration, "bias", {}, {"bias", "bias from C qd"}),
+    (kinematics, "com", {}, {"c"}), (kinematics, "com_jacobian", {}, {"dc/dq"}),
+    (kinematics, "centroidal_momentum_matrix", {}, {"centroidal momentum matrix"}),
     (acceleration, "acceleration", {}, {"qdd", "tau from MuJoCo's qdd by TMT", "dE/dt - tau.qd at MuJoCo's qdd"}),
     (acceleration, "inverse", {}, {"tau from TMT's qdd by mj_inverse", "tau from Y theta"}),
     (acceleration, "energy", {}, {"energy"}), (acceleration, "potential_energy", {}, {"potential energy"}),

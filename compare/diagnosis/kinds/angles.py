@@ -16,7 +16,12 @@ from .terms import coefficients, terms, unit_columns
 
 Parallel = tuple[str, np.ndarray, np.ndarray]  # a name, a column (states, entries) and its factors (states,)
 OF_FACTORS = "coefficient", "term"  # kinds
-ANGLE, FACTOR, ORDER, CONSTANT = 0.45, 0.5, 0.25, 1.05  # costs; a constant is rather a number that nobody writes
+ANGLE, FACTOR, ORDER, CONSTANT = (
+    0.45,
+    0.5,
+    0.25,
+    1.05,
+)  # costs; a constant is rather a number that nobody writes
 ORDERED = " in the angular velocity", " in the positions"  # where alone an order may be another
 MOST_HINGES = 4  # of which products of sines and cosines are tried
 CLOSE = 1e-6  # of a coefficient, before the values are compared
@@ -105,14 +110,23 @@ def functions_of(equations: Equations) -> list[dict[str, np.ndarray]]:
 
     One table, and for each slide those times its length and its square.
     """
-    joints, one, angles = list(zip(equations.joints.items(), equations.tree.reference)), np.ones(len(equations.q)), []
+    joints, one, angles = (
+        list(zip(equations.joints.items(), equations.tree.reference)),
+        np.ones(len(equations.q)),
+        [],
+    )
     for (name, at), zero in joints:
         if at.kind == "hinge":
             angles.append((name, equations.q[:, at.q.start] - zero))
     powers = []
     for name, angle in angles if len(angles) <= MOST_HINGES else ():
         sine, cosine = np.sin(angle), np.cos(angle)
-        of_hinge = {"": one, f"sin({name})": sine, f"cos({name})": cosine, f"sin({name}) cos({name})": sine * cosine}
+        of_hinge = {
+            "": one,
+            f"sin({name})": sine,
+            f"cos({name})": cosine,
+            f"sin({name}) cos({name})": sine * cosine,
+        }
         powers.append(of_hinge | {f"sin({name})^2": sine**2, f"cos({name})^2": cosine**2})
     table = {"1": one}
     for factors in product(*(of_hinge.items() for of_hinge in powers)):
@@ -129,7 +143,9 @@ def functions_of(equations: Equations) -> list[dict[str, np.ndarray]]:
     for (name, at), _ in joints if angles else ():
         for power, said in {1: name, 2: f"{name}^2"}.items() if at.kind == "slide" else ():
             length = equations.q[:, at.q.start] ** power
-            tables.append({f"{said} {function}".removesuffix(" 1"): length * x for function, x in table.items()})
+            tables.append(
+                {f"{said} {function}".removesuffix(" 1"): length * x for function, x in table.items()}
+            )
     return tables
 
 
@@ -164,7 +180,10 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Hypothesis]:
     for place, column, found in parallel(search, unit_columns(equations).items()):
         for table in tables:
             for said, change in instead_of(found, table):
-                values, cost = search.right + change[:, None] * column, ANGLE if np.ptp(change) > 0.0 else CONSTANT
+                values, cost = (
+                    search.right + change[:, None] * column,
+                    ANGLE if np.ptp(change) > 0.0 else CONSTANT,
+                )
                 yield slip(equations.right, place, said, values, cost, "angle")
     factors = [*coefficients(equations), *terms(equations)]
     columns = [(one.cause.place, one.added) for one in factors if one.cause.kind in OF_FACTORS]

@@ -27,7 +27,14 @@ from ..hypothesis import Hypothesis
 from ..model import Equations
 from .terms import speeds_of_joints
 
-COSTS = {"sign": 0.0, "order": 0.25, "unit": 0.1, "angles": 0.0, "displacement": 0.1, "axes": 0.15}  # of kinds
+COSTS = {
+    "sign": 0.0,
+    "order": 0.25,
+    "unit": 0.1,
+    "angles": 0.0,
+    "displacement": 0.1,
+    "axes": 0.15,
+}  # of kinds
 FIRST, OF_NAME, OF_SLIDE = 0.1, 0.15, 0.2  # more, of the first joint, of each other, of a slide
 BLOCK = 64  # conventions that are evaluated together
 PARALLEL = 1e-9  # of a cosine from 1
@@ -245,7 +252,10 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
             causes = [named("axes", place, explains) for place, explains in said.items() if explains]
             if causes:
                 yield Convention(together(causes, 0.0), own_q, own_qd, S, drift)
-        for explains, factor in {"twice as large, q' = q omega for q omega / 2": 2.0, "half as large": 0.5}.items():
+        for explains, factor in {
+            "twice as large, q' = q omega for q omega / 2": 2.0,
+            "half as large": 0.5,
+        }.items():
             S = np.eye(equations.nv)
             S[joint.qd, joint.qd] *= factor
             yield constant(equations, named("axes", f"angular velocity of {name}", explains), S)

@@ -46,7 +46,9 @@ def edits(equations: Equations) -> Iterator[Hypothesis]:
                 changed = np.argwhere(field != stated[name]).tolist()
                 moved |= {Path(name, at := tuple(k)): float(field[at] - stated[name][at]) for k in changed}
             if moved:
-                chosen.setdefault(tuple((path, f"{x:.12g}") for path, x in moved.items()), (cost, edit, moved))
+                chosen.setdefault(
+                    tuple((path, f"{x:.12g}") for path, x in moved.items()), (cost, edit, moved)
+                )
     every = list(chosen.values())
     for start in range(0, len(every), BLOCK):
         block = every[start : start + BLOCK]

@@ -53,7 +53,9 @@ def all_slips(mechanism: Kinematics) -> Iterator[Changed]:
         back, axes = np.swapaxes(R, 1, 2), mechanism.equations.frame_of(b).axes
         stated = axes.T @ I @ axes  # its numbers in the file
         yield Changed("inertia of {}", "not turned to the inertial frame", b, inertia=back @ stated @ R - I)
-        yield Changed("inertia of {}", "turned back, R' I R for R I R'", b, inertia=back @ back @ I @ R @ R - I)
+        yield Changed(
+            "inertia of {}", "turned back, R' I R for R I R'", b, inertia=back @ back @ I @ R @ R - I
+        )
         said = "in world axes, R I R', for one in its own axes"
         yield Changed("inertia of {}", said, b, inertia=R @ I @ back - I)
         if is_small:

@@ -148,7 +148,10 @@ def squares_of_velocities(equations: Equations) -> Iterator[Hypothesis]:
     if equations.nv > MOST_SPEEDS:
         return
     kinematics, layout, tree = Kinematics(equations), equations.layout, equations.tree
-    entries, n = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]], len(equations.q)
+    entries, n = (
+        [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]],
+        len(equations.q),
+    )
 
     def column(pairs: list[tuple[ndarray, ndarray]], gravity: ndarray) -> ndarray:
         """What a mass of 1 adds whose v^2 has these products of Jacobians, and its weight."""

@@ -58,7 +58,11 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
         if len(rows) == len(columns) > 1:
             above, below = np.ix_(range(len(q)), rows, columns), np.ix_(range(len(q)), columns, rows)
             upper, lower = f"M[{first}][{second}]", f"M[{second}][{first}]"
-            for place, blocks in {upper: [above], lower: [below], f"{upper} and {lower}": [above, below]}.items():
+            for place, blocks in {
+                upper: [above],
+                lower: [below],
+                f"{upper} and {lower}": [above, below],
+            }.items():
                 turned = M.copy()
                 for at in blocks:
                     turned[at] = np.swapaxes(M[at], 1, 2)
@@ -66,7 +70,9 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
                 yield option(equations.right, place, "there", "transposed", values)
     if any(tree.armature):
         rotors = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
-        yield option(equations.right, "armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0])
+        yield option(
+            equations.right, "armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0]
+        )
 
 
 def exchanged(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

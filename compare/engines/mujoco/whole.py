@@ -12,7 +12,10 @@ class Whole:
     """Its methods take data of which mj_comPos is done. What never moves does not count."""
 
     def __init__(self, model: mujoco.MjModel) -> None:
-        self.model, moves = model, model.body_treeid >= 0  # no tree: the world, mocap bodies, what is fixed to them
+        self.model, moves = (
+            model,
+            model.body_treeid >= 0,
+        )  # no tree: the world, mocap bodies, what is fixed to them
         self.trees = np.flatnonzero(moves & ~moves[model.body_parentid])
         self.masses = model.body_subtreemass[self.trees]
         self.shares = self.masses / self.masses.sum()
@@ -34,5 +37,5 @@ class Whole:
     def of_trees(self, function: Jacobian, d: mujoco.MjData) -> np.ndarray:
         result = np.zeros((len(self.trees), 3, self.model.nv))
         for jacobian, body in zip(result, self.trees):
-            function(self.model, d, jacobian, body)
+            function(self.model, d, jacobian, int(body))
         return result

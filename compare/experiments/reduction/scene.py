@@ -87,7 +87,8 @@ class Scene:
         of_whole, stepper = joints(self.whole.model), self.stepper
         places = [k for name in joints(small.model) for k in range(self.whole.model.nq)[of_whole[name][0]]]
         motions = [
-            {"key": roll.name, "steps": roll.steps, "start": stepper.as_fields(roll.state)} for roll in self.rolls
+            {"key": roll.name, "steps": roll.steps, "start": stepper.as_fields(roll.state)}
+            for roll in self.rolls
         ]
         step = {"dt": stepper.dt, "integrator": stepper.integrator}
         return {"file": file, **step, "places": places, "error": error, "motions": motions}
