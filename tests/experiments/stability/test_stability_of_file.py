@@ -169,7 +169,9 @@ def test_recorded_controls_are_judged():
 
 
 @pytest.mark.parametrize("dt, is_refused", [(None, False), (1e-3, False), (1.1e-5, False), (0.9e-5, True)])
-def test_recorded_controls_may_be_as_long_as_100_000_of_the_steps_that_are_asked_for(tmp_path, dt, is_refused):
+def test_recorded_controls_may_be_as_long_as_100_000_of_the_steps_that_are_asked_for(
+    tmp_path, dt, is_refused
+):
     path = tmp_path / "long.csv"
     path.write_text("time,push\n0,0\n1,0.1\n")
     reading = read(TURNING.format(dt=0.002, actuator=MOTOR.replace("<motor", '<motor name="push"')))
