@@ -328,6 +328,25 @@ def test_a_wrong_number_in_values_with_noise_has_its_uncertainty(of):
     assert "Probable cause" not in alone and "differ by noise of 0." in alone and "rows of 200" not in alone
 
 
+def test_a_function_whose_values_scatter_has_an_error_and_no_noise():
+    """A table of the same values has noise; a function is asked for more of them, and what differs is said."""
+    q, qd = np.random.default_rng(5).uniform(-3.0, 3.0, (2, 100, 2))
+
+    def erratic(q, qd):
+        return np.asarray(bias(q, qd)) * (1.0 + 1e-3 * np.sin(1e5 * np.asarray(q)))
+
+    of_table = message_of(bias=np.array([erratic(*state) for state in zip(q, qd)]), q=q, qd=qd)
+    assert "differ by noise of 0." in of_table and "noise" not in message_of(bias=erratic)
+
+
+def test_accelerations_in_which_one_joint_never_moves_follow_from_no_mass_matrix():
+    def of_hip(q, qd, tau):
+        return np.array(acceleration(q, qd, tau)) * [1.0, 0.0]
+
+    said = message_of(acceleration=of_hip)
+    assert "qdd[knee]" in said and "Probable cause" not in said
+
+
 def test_a_difference_in_one_entry_alone_is_no_noise():
     states, h = table(200)
     h[:, 0] += 0.01 * np.sin(7.0 * states["q"][:, 0])

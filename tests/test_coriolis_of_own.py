@@ -28,10 +28,17 @@ def with_a_sign(q, qd):
     return C
 
 
+def symmetric(q, qd):
+    """A symmetric matrix with the right product: so has its transpose."""
+    h, size = right(q, qd) @ qd, float(qd @ qd) or 1.0
+    return (np.outer(h, qd) + np.outer(qd, h)) / size - (h @ qd) * np.outer(qd, qd) / size**2
+
+
 SAID = {
     "transposed": (lambda q, qd: right(q, qd).T, {"C qd"}),
     "is 2 times": (lambda q, qd: 2.0 * right(q, qd), {"C qd", "C + C'"}),
     "not skew": (skewed, {"C + C'"}),
+    "not skew: C is not": (symmetric, {"C + C'"}),
     "is not the velocity part": (with_a_sign, {"C qd", "C + C'"}),
 }
 
