@@ -2,6 +2,7 @@
 
 import json
 import sys
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
@@ -204,3 +205,21 @@ def test_an_experiment_under_way_is_not_finished_although_it_has_rows(tmp_path):
     run.sections += [section("mass", GOOD), section("gravity", GOOD)]
     run.clock.ends("mass")
     assert [one.name for one in run.finished().sections] == ["mass"]
+
+
+def test_after_an_interrupt_there_are_the_figures_that_are_drawn_and_no_others(tmp_path):
+    (tmp_path / "figures").mkdir()
+    setup = SimpleNamespace(own=None, robot=ARM, is_quick=False, alone=True, options=Options())
+    names = ["mass", "gravity", "acceleration"]
+    run = experiment.Run(names, setup, tmp_path, Terminal(), None, Clock())
+    drawn, broken, under_way = (Future() for _ in names)
+    drawn.set_result([experiment.Figure("mass", "A caption.")])
+    broken.set_exception(ValueError("no room"))
+    for name, drawing in zip(names, (drawn, broken, under_way)):
+        run.sections.append(section(name, GOOD))
+        run.clock.ends(name)
+        run.drawings.append((run.sections[-1], drawing))
+        (tmp_path / "figures" / f"{name}.png").touch()
+    sections = run.finished().sections
+    assert [[figure.file for figure in part.figures] for part in sections] == [["mass"], [], []]
+    assert [path.name for path in (tmp_path / "figures").iterdir()] == ["mass.png"]

@@ -30,8 +30,8 @@ matplotlib.rc("axes", titlesize=9, grid=True, axisbelow=True)
 matplotlib.rc("grid", alpha=0.3)
 matplotlib.rc("legend", frameon=False)
 matplotlib.rc("savefig", dpi=DPI)
-# names that leave no room for what is drawn
-warnings.filterwarnings("ignore", "constrained_layout not applied")
+# names that leave no room for what is drawn, or have letters that no font has
+warnings.filterwarnings("ignore", "constrained_layout not applied|Glyph .* missing from")
 
 
 def joint_lines(robot: Robot) -> dict[str, Line]:

@@ -7,6 +7,8 @@ import os
 import random
 import re
 import shutil
+import subprocess
+import sys
 from dataclasses import dataclass, make_dataclass, replace
 
 import pytest
@@ -133,6 +135,14 @@ def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):
     style.pixels(figure)
     formulas = [of.get_text() for of in figure.findobj(Text) if "$" in of.get_text() and of.get_parse_math()]
     assert formulas and all("mathdefault" in text for text in formulas)
+
+
+def test_letters_that_no_font_has_are_drawn_without_a_word():
+    """In a process of its own: pytest shows every warning."""
+    drawing = "figure = Figure(); figure.text(0, 0, '\u5173\u8282 \U00013000'); print(style.pixels(figure).size > 0)"
+    code = f"from compare.report import style; from matplotlib.figure import Figure; {drawing}"
+    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, encoding="utf-8")
+    assert (run.stdout.split(), run.stderr) == (["True"], "")
 
 
 OLD = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"

@@ -70,6 +70,7 @@ def test_what_does_not_agree_is_named_and_nothing_else():
     assert all(part in text for part in ("3 of 10 experiments", " mass.", "2 of 4"))
     assert not any(part in text for part in ("gravity", "diagnosis", "number", "First failing"))
     assert "First failing check: mass: Mbar" in verdict(sections, 10)
+    assert "Largest share" not in text and "Largest share" in verdict(sections[1:2], 10)
 
 
 CAUSE = Cause(rank=2, place="", stated=1.0, explains=2.0, text="mass of forearm: stated 1")
