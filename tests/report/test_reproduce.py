@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 
+import pandas as pd
 import pytest
 from in_process import without_workers
 from models import PATHS
@@ -129,6 +130,16 @@ def test_a_wrong_number_of_the_script_is_found(pattern, runs, tmp_path, capsys):
     (tmp_path / "changed.py").write_text(changed)
     status, lines = repeated(tmp_path / "changed.py")
     assert status == 1 and any("NOT THE SAME" in line for line in lines)
+
+
+def test_the_state_of_a_quantity_has_the_largest_share_of_its_tolerance(runs):
+    table = pd.read_csv(runs["mass"].with_name("tables") / "mass.csv")
+    rows = table[table.quantity == "Mbar"]
+    worst = rows.loc[rows.difference_over_bar.idxmax()]
+    state = json.loads(re.search(r'"states": \[\s*(\{.*\})', runs["mass"].read_text(encoding="utf-8"))[1])
+    assert len(rows) > 1 and rows.difference_over_bar.nunique() > 1
+    share = pytest.approx(worst.difference_over_bar, rel=1e-9)
+    assert state["quantity"] == "Mbar" and state["difference"] / state["tolerance"] == share
 
 
 @pytest.mark.parametrize("name", ["mass", "reduction"])

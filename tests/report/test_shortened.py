@@ -141,7 +141,9 @@ def test_letters_that_no_font_has_are_drawn_without_a_word():
     """In a process of its own: pytest shows every warning."""
     drawing = "figure = Figure(); figure.text(0, 0, '\u5173\u8282 \U00013000'); print(style.pixels(figure).size > 0)"
     code = f"from compare.report import style; from matplotlib.figure import Figure; {drawing}"
-    run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, encoding="utf-8")
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, encoding="utf-8"
+    )
     assert (run.stdout.split(), run.stderr) == (["True"], "")
 
 
