@@ -113,6 +113,21 @@ def test_a_robot_with_motors_alone_is_set_going_and_moved_by_its_controls():
     assert 1e-6 < best.eps < 1e-2 and best.error < 1e-7
 
 
+@pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicit", "implicitfast"])
+@pytest.mark.parametrize("more, inputs", [('<motor joint="knee" gear="2"/>', [1]), ("", [])])
+def test_the_control_of_a_damper_changes_damping_and_is_no_input(integrator, more, inputs):
+    """The force of a damper is -kv u speed: an implicit step divides by an inertia that depends on u."""
+    damper = f'<damper joint="hip" kv="3" ctrlrange="0 1"/>{more}'
+    text = MOTORS.replace("Euler", integrator).replace('<motor joint="knee" gear="5"/>', damper)
+    keys = f'<keyframe><key qpos="0.2 0.3" qvel="0.5 -0.4" ctrl="0.7{" 0.1" * len(inputs)}"/></keyframe></mujoco>'
+    text = text.replace("</mujoco>", keys)
+    setup = setup_of_file(text)
+    subject = ways.Subject(setup.engines["mujoco"], ways.case_of(setup.robot), 0.002, integrator, 2)
+    assert subject.inputs.tolist() == inputs and subject.gains.shape == (2, 2, len(inputs))
+    assert subject.by_differences(1e-4, True) == pytest.approx(subject.exact, rel=1e-6, abs=1e-8)
+    assert failed(answered(text)) == []
+
+
 def test_a_wrong_damper_and_a_wrong_derivative_are_seen(mujoco, monkeypatch):
     servo = hinge(kp=20.0, kv=0.5)
     assert failed(derivatives.rows(setup_between(servo))) == []

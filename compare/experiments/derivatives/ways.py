@@ -12,6 +12,7 @@ from tmt.exact.many import exact_of_many
 
 from ...core.rows import Row, column
 from ...engines.mujoco import Mujoco
+from ...engines.mujoco.changes import FIXED_GAIN
 from ...engines.mujoco.names import control_of
 from ...engines.mujoco.stepper import Stepper
 from ...judge.agree import share_of
@@ -100,7 +101,9 @@ class Subject:
         self.by, self.inputs, self.places = "qfrc_applied", dofs, np.r_[dofs, m.nv + dofs]
         if case.controller:
             acting = [i for i, u in enumerate(case.controller.controls) if u is not None]
-            inputs = [control_of(m, i)[0] for i in acting if not m.actuator_actnum[i]]
+            # a control that changes damping or stiffness is no torque
+            is_torque = ~m.actuator_gainprm[:, 1:3].any(axis=1) | (m.actuator_gaintype == FIXED_GAIN)
+            inputs = [control_of(m, i)[0] for i in acting if is_torque[i] and not m.actuator_actnum[i]]
             self.by, self.inputs = "ctrl", np.array(inputs, dtype=int)
         self.starts, self.gains = list[Array](), np.zeros((states, len(dofs), len(self.inputs)))
         for k in range(states):

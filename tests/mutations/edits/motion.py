@@ -73,6 +73,7 @@ EDITS = (
     # derivatives
     ("derivatives.ways", "Subject.share_of_differences", "FACTOR * EPS * sizes / eps", "30 * _0", "rounding of differences x 30"),
     ("derivatives.ways", "Subject.share_of_differences", "np.fmax(*terms)", "terms[0]", "one eps tells the truncation"),
+    ("derivatives.ways", "Subject.__init__", "is_torque[i] and _1", "_1", "the control of a damper is a torque"),
     ("derivatives.ways", "Subject.share_of_differences", "max(shares)", "min(shares)", "the worst eps alone is judged"),
     ("derivatives.ways", "best_of", "ALIKE * known[least]", "known[least]", "no errors are alike"),
     ("derivatives.ways", "worst_block", "largest / _1", "largest", "an error is not relative"),
