@@ -103,6 +103,18 @@ def test_one_slip_is_one_cause_beneath_the_first_experiment_that_differs(folder,
     ]
 
 
+def test_what_is_not_finite_is_said_before_causes_and_nothing_is_said_to_be_mended(folder, capsys):
+    """h[hip] is NaN, h[knee] is 0: the latter has a cause."""
+    (folder / "holed.py").write_text("from mine import *\n\nholed = changed(bias=lambda q, v: np.array([np.nan, 0.0]))\n")
+    with without_workers():
+        status, out, _ = answered(
+            ["all", "--quick", "--mjcf", "double.xml", "--reference", "holed.py:holed"], capsys
+        )
+    words = " ".join(out.split())
+    assert status == 1 and "With the cause mended" not in words
+    assert 0 < words.index("bias is not finite") < words.index("CAUSE ")
+
+
 def test_torques_that_act_with_gears_are_one_cause_in_words(folder):
     geared = "lambda q, v, tau: acceleration(q, v, [25.0, 2.0] * tau)"
     (folder / "gears.py").write_text(f"from mine import *\n\ngears = changed(acceleration={geared})\n")
@@ -187,17 +199,19 @@ BROKEN = "x = 1\ndef mass_matrix(q:\n"
     ("mine.py:insied", "known: inside"),
     ("broken.py:", "broken.py, line 2: SyntaxError"), ("broken:", "broken, line 2: SyntaxError"),
     ("leaving.py:x", "leaving.py, line 2: SystemExit: 3"), ("mine.py:Needing", "'mass'"),
-    ("mine.py:&--joints&-hip,ankle", "'ankle'"),
+    ("mine.py:&--joints&-hip,ankle", "'ankle'"), ("values.csv", "compare.assert_agrees"), ("mine", "FILE.py,"),
+    ("zeros.py", "zeros.py: "),
 ])  # fmt: skip
 def test_a_bad_reference_gets_one_line_and_status_2(folder, capsys, asked, word):
     (folder / "broken.py").write_text(BROKEN)
+    (folder / "zeros.py").write_bytes(b"x = 1\0")
     (folder / "leaving.py").write_text("import sys\nsys.exit(3)\n")
     before = sorted(folder.iterdir())
     words = ["mass", "--quick", "--mjcf", "double.xml", "--reference", *asked.split("&")]
     status, out, err = answered(words, capsys)
     lines = [line for line in err.splitlines() if line != "a user's file may print"]
     assert (status, out, len(lines)) == (2, "", 1)
-    assert lines[0].startswith("python -m compare: ") and word in lines[0]
+    assert lines[0].startswith("python -m compare: ") and word in lines[0] and "None" not in lines[0]
     assert sorted(folder.iterdir()) == before
 
 

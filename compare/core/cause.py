@@ -9,7 +9,7 @@ from typing import Any
 class Cause:
     """One explanation: an option, a convention, a number or a term that is not as stated, or two of them."""
 
-    rank: int  # 1: an option, or the convention of a joint; 2: one number, term or coefficient; 3: two
+    rank: int  # 1: an option, or the convention of a joint; 2: one number, term or coefficient; 3: two, or rounding
     place: str  # such as "mass of forearm"
     stated: float | str
     explains: float | str | None  # the value that explains the difference; None: it is not a finite number

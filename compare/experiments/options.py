@@ -23,6 +23,7 @@ WHOLE = 1e-6  # of a step: a period so near to a multiple of it is one
 GAIN = number("gain", 0.0, 1e12)
 FILES = "scenes", "controls", "write"  # options that name a file
 SOLUTIONS = ".xml", ".mjcf", ".urdf"
+TABLES = ".csv", ".npz", ".npy", ".mat", ".txt"
 
 
 def stated_reference(text: str) -> str:
@@ -31,7 +32,9 @@ def stated_reference(text: str) -> str:
         return f"{text}:"
     if text in ("arm", "model") or ":" in text or text.lower().endswith(SOLUTIONS):
         return text
-    choices = "arm, model, FILE.xml or .urdf, FILE.py:OBJECT or MODULE:OBJECT"
+    choices = "arm, model, FILE.xml or .urdf, FILE.py, FILE.py:OBJECT or MODULE:OBJECT"
+    if text.lower().endswith(TABLES):
+        choices += "; a table of values is compared in Python, see help(compare.assert_agrees)"
     hint = expected(text, ("arm", "model"), choices)
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
 

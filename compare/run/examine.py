@@ -29,6 +29,7 @@ from .reference import Compared
 Value = TypeVar("Value")
 START, END = "start", "figures"  # tasks of the clock: before the first experiment, and after the last
 SHOWN = 3  # causes on the terminal
+VALID = "returns valid values"  # of a function of the user's own
 # the numbers on which Mbar and h depend, by their names in `parameters`
 IN_EQUATIONS = (
     "order",
@@ -188,7 +189,8 @@ class Run:
                     len(self.causes) - SHOWN,
                 )
                 lines += [f"  {block('run', 'more', count=more)}"] if more > 0 else []
-                for line in lines or [f"  first: {failing.differing[0]}"]:
+                is_first = not lines or failing.differing[0].quantity.endswith(VALID)
+                for line in [f"  first: {failing.differing[0]}"] * is_first + lines:
                     self.terminal.say(line)
                 is_said = True
 
@@ -247,8 +249,7 @@ def add_problems(result: Result, problems: Sequence[Problem], told: set[int]) ->
     for number, problem in enumerate(problems):
         if number not in told and (asked is None or problem.quantity in asked):
             told.add(number)
-            what = f"{problem.quantity} returns valid values"
-            result.check("", what, None, 0.0, "", problem.text, rule="equal")
+            result.check("", f"{problem.quantity} {VALID}", None, 0.0, "", problem.text, rule="equal")
     result.checks += others
 
 
@@ -279,9 +280,9 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
     if setup.robot.is_stated and numbers:
         is_one = is_explained and found.why.diagnosis.causes[0].rank < 3
         return ([found.said[0], *others], 0) if is_one else (numbers, 0)
-    places = [cause.place for cause in numbers]
-    searched = [cause for cause in found.said if cause.place not in places]
-    return searched + numbers, found.states * is_explained
+    searched = [cause for cause in found.said if cause.place not in {each.place for each in numbers}]
+    is_known = is_explained and not (setup.own and setup.own.equations.problems)  # what is not finite stays so
+    return searched + numbers, found.states * is_known
 
 
 def add_crash(result: Result, quantity: str, error: Exception) -> None:

@@ -151,3 +151,37 @@ def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):
     for old, new in (("1e-9 1e-9 1e-9", "1e-9 1.000001e-9 1e-9"), ('mass="1e-3"', 'mass="1.000000001e-3"')):
         assert len(failing(beside_solution(tmp_path, small.replace(old, new), small))) == 1
     assert failing(beside_solution(tmp_path, small, small)) == []
+
+
+def small_link(com, quat, diagonal):
+    return f'<body name="b"><joint name="j"/><inertial pos="{com}" quat="{quat}" mass="2" diaginertia="{diagonal}"/></body>'
+
+
+def test_what_a_saved_file_rounds_is_one_cause_beneath_a_number_that_is_wrong(tmp_path):
+    """A file of many digits, saved by MuJoCo with six; then its com 1 % off."""
+    right, saved, wrong = (tmp_path / name for name in ("right.xml", "saved.xml", "wrong.xml"))
+    link = small_link(
+        "0.123456789 0 -0.5", "0.87995812 0.04785356 -0.01442092 0.47241512", "0.11234567 0.09123456 0.04"
+    )
+    right.write_text(f"<mujoco><worldbody>{link}</worldbody></mujoco>")
+    mujoco.mj_saveLastXML(str(saved), mujoco.MjModel.from_xml_path(str(right)))
+    text = saved.read_text()
+    assert "-0.5" in text
+    wrong.write_text(text.replace("-0.5", "-0.505"))
+    for file, places in ((saved, 1), (wrong, 2)):
+        compared = compared_with(str(right), str(file))
+        result = parameters.rows(
+            Setup.quick(compared.robot, engines(compared.mujoco, None), reading=compared.reading)
+        )
+        assert "inertia" in failing(result) and len(result.causes) == places
+        assert result.causes[-1].rank == 3 and "mj_saveLastXML" in result.causes[-1].text
+    assert result.causes[0].place == "com of b" or result.causes[0].place.startswith("com")
+
+
+@pytest.mark.parametrize("share, are_rounded", [(0.9, True), (1.1, False)])
+def test_six_digits_move_a_number_by_no_more_than_their_tolerance(share, are_rounded):
+    there, off = np.array([0.3, -2.0, 1.0]), share * 1e-5 * 2.0 * np.array([0.5, 1.0, 0.25])
+    result = Result("parameters")
+    com, axis = (Stated("b", name, there, there + off, tolerance=1e-15) for name in ("com", "axis"))
+    causes = causes_of([compare_number(result, each, "") for each in (com, axis)], ("here", "there"))
+    assert (len(causes) == 1 and causes[0].rank == 3) == are_rounded

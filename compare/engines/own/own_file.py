@@ -102,7 +102,8 @@ def raised_in(place: str) -> Iterator[None]:
         text = f": {' '.join(error.text.split())[:60]}" if error.text else ""
         where = place if Path(error.filename or place).stem == Path(place).stem else error.filename
         what = f"{type(error).__name__}, {error.msg}{text}"
-        raise OwnError(f"{where}, line {error.lineno}: {what}") from None
+        at = f", line {error.lineno}" if error.lineno else ""  # None: the file is not text
+        raise OwnError(f"{where}{at}: {what}") from None
     except BaseException as error:  # also SystemExit: the file may be a script
         if is_interrupt(error):
             raise

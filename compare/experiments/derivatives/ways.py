@@ -184,7 +184,8 @@ def case_of(robot: Robot) -> Case:
     moving = [case for case in cases if not case.is_held] or cases
     free = min(moving, key=lambda case: "regular" not in case.scene.tags)
     speed = tuple(SET_GOING[kind] for kind in robot.coordinates.kinds_of_speeds)
-    set_going = free.changed(name=f"{free.name}, set going", speed=speed) if robot.is_read else free
+    name = f"{free.name.removesuffix(', set going')}, set going"  # the scene of a robot at rest has this name already
+    set_going = free.changed(name=name, speed=speed) if robot.is_read else free
     try:
         return set_going.changed(torque="servos")  # of motors, whose controls are 0
     except WrongField:

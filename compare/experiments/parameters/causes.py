@@ -11,6 +11,9 @@ from ...core.text import say
 from .numbers import OF_BODIES, Compared
 
 SAME = 1e-9  # relative: a factor, or a change, that is the same at several places
+# of the largest of a vector: mj_saveLastXML writes six digits, which moves a number by half a unit of its sixth digit,
+# 5e-6 at most, and one that is turned by a quaternion twice as much
+SIX_DIGITS = 1e-5
 ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("anchor", "com"))  # quantities with a common factor
 OF_JOINTS = "anchor", "axis", "ref"
 
@@ -28,6 +31,7 @@ def causes_of(
         here, there = float(first.here[k]), float(first.there[k])
         known: dict[str, Any] = {"stated": there, "explains": here if np.isfinite(here) else None}
         size, rank = max(number.size for number in together), min(number.rank for number in together)
+        rank = 3 if kind == "six_digits" else rank  # beneath what no printing explains
         known |= {name: values[name] for name in known if name in values}
         causes.append(Cause(place=place or text.partition(":")[0], text=text, rank=rank, size=size,
                             quantity=first.quantity, owners=len(together) if kind == "differ" else 1, **known))  # fmt: skip
@@ -43,6 +47,9 @@ def causes_of(
         there = ", ".join(number.place for number in every)
         here = ", ".join(number.place for number in sorted(every, key=lambda number: float(number.here[0])))
         explain("order", order, stated=there, explains=here)
+    written = [number for number in left if is_in_six_digits(number)]
+    if sum(np.count_nonzero(number.differs) for number in written) > 1:
+        explain("six_digits", written, most=max(map(relative, written)))
     while left:
         first = left[0]
         same = [number for number in left if number.quantity == first.quantity]
@@ -55,6 +62,17 @@ def causes_of(
         lacks = first.place in from_geoms and len(together) > 1
         explain("differ", together if first in together else [first], lacks_inertial=lacks)
     return causes
+
+
+def is_in_six_digits(number: Compared) -> bool:
+    """Whether a number here is the one there as far as it is written with six digits."""
+    return relative(number) <= SIX_DIGITS
+
+
+def relative(number: Compared) -> float:
+    """The largest difference over the largest component there; inf: all are 0 there."""
+    largest = float(np.abs(number.there).max())
+    return float(np.abs(number.here - number.there).max()) / largest if largest else np.inf
 
 
 def common_factor(numbers: Sequence[Compared]) -> float | None:

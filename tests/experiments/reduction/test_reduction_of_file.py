@@ -435,3 +435,5 @@ def test_a_file_of_controls_is_read_or_refused_in_one_line(tmp_path, text, messa
         with pytest.raises(SceneError, match=message) as refused:
             read_controls(path, ["left upper"], 0.002)
         assert "\n" not in str(refused.value)
+        with pytest.raises(SceneError, match="the file has none"):
+            read_controls(path, [], 0.002)

@@ -14,7 +14,7 @@ EDITS = (
     ("core.options", "process_count", "1", "0", "a fleet may have no process"),
     ("core.options", "number", "least <= kind(text) <= most", "kind(text) <= most", "a step may be negative"),
     ("core.options", "expected", "word.casefold()", "word", "a word in capitals is near to none"),
-    ("experiments.options", "stated_reference", "text.lower().endswith(_1)", "text.endswith(_1)", "FILE.XML is no reference"),
+    ("experiments.options", "stated_reference", "text.lower().endswith(_1)", "text.endswith(_1)", "FILE.XML is no reference", 1),
     ("fleet.models", "lines_of", "'#@'", "'#'", "a list names further lists"),
     ("export.command", "identifier", "_1 and not is_word(name)", "_1", "a function is named like a word of a language"),
     ("fleet.table", "FileRow.order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),

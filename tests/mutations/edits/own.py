@@ -13,6 +13,7 @@ EDITS = (
     ("own.equations", "OwnEquations.each", "key not in self.known", "True", "a function is called again at a state"),
     ("agreement.comparison", "Comparison.tolerances", "np.abs(right).max(axis=0)", "self.roundings[name] / 1e-14",
      "rtol is of the terms"),
+    ("run.examine", "causes", "setup.own and _1", "False", "what is not finite is mended by a cause"),
     # joints
     ("joint_map", "JointMap.own_positions", "_1 + self.zero", "_1 - self.zero", "a zero is taken the other way"),
     ("joint_map", "JointMap.own_forces", "_1 * self.sense", "_1", "a force keeps its sense"),

@@ -24,6 +24,8 @@ EDITS = (
     ("parameters.causes", "causes_of", "[number for number in same if is_near(*_1)]", "same",
      "all wrong numbers of a quantity are one cause"),
     ("parameters.causes", "causes_of", "number.place == first.place and _1", "_1", "all bodies are one cause"),
+    ("parameters.causes", "SIX_DIGITS", "1e-5", "1.2e-5", "more than six digits are rounding"),
+    ("parameters.causes", "causes_of", "is_in_six_digits(number)", "False", "a saved file is wrong number by number"),
     ("parameters.numbers", "Compared.values", "(here, there)", "(there, here)", "the files are exchanged", 2),
     ("parameters", "beside_stated", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     ("parameters", "rows", "sorted(causes, key=_1)", "causes", "causes in the order of finding"),

@@ -26,7 +26,7 @@ EDITS = (
     ("run.examine", "add_crash", "result.check(*_1)", "None", "an experiment that breaks off is no failed check"),
     ("run.command", "first_screen", "report.answers_first", "False", "the verdict comes before the answer"),
     ("run.examine", "Run.say_outcomes", "failing.differing and _1", "False", "no cause is beneath what differs"),
-    ("run.examine", "causes", "found.states * is_explained", "0", "it is not said what a mended cause leaves"),
+    ("run.examine", "causes", "found.states * is_known", "0", "it is not said what a mended cause leaves"),
     ("run.command", "first_screen", "failing._replace(*_1)", "failing", "what follows from a cause is said beside it"),
     ("run.examine", "lines_of", "cause.text.split(_1)", "[cause.text]", "what explains the same is not beneath a cause"),
     # files
