@@ -120,7 +120,7 @@ class Pushed:
         speeds = motion.state[self.stepper.places["qvel"]]
         self.is_in_motion = bool(speeds.any() or len(motion.times))
         self.truth, self.survived = integrator, 0.0
-        self.fine, self.by_twice = dict[tuple[float, int], Run](), dict[tuple[float, int], float]()
+        self.fine, self.by_twice = dict[tuple[float, int, float], Run](), dict[tuple[float, int], float]()
         self.tried = dict[tuple[float, float, str, float, float], Verdict]()
         self.surely = set[tuple[float, float, str, float, float]]()
 
@@ -162,19 +162,19 @@ class Pushed:
 
     # fine runs
 
-    def fine_run(self, push: float, way: int) -> Run:
-        """The run of fine steps, refined where it is not finite."""
-        if (push, way) not in self.fine:
+    def fine_run(self, push: float, way: int, lasts: float = 0.0) -> Run:
+        """The run of fine steps, refined where it is not finite. lasts: s; 0.0: as long as others."""
+        if (push, way, lasts) not in self.fine:
             dt = self.fine_dt
             for _ in range(1 + REFINED):
-                run = self.run(push, way, dt, self.truth, fast=100.0 * FAST, is_fine=True)
+                run = self.run(push, way, dt, self.truth, fast=100.0 * FAST, lasts=lasts, is_fine=True)
                 if run.is_finite:
                     break
                 dt /= 2.0
             if push:
                 run = run._replace(speeds=run.speeds[:0])  # they take memory
-            self.fine[push, way] = run
-        return self.fine[push, way]
+            self.fine[push, way, lasts] = run
+        return self.fine[push, way, lasts]
 
     def twice(self, push: float, way: int) -> float:
         """How far a run of twice the fine step ends from that, rad or m."""
@@ -397,7 +397,8 @@ class Pushed:
     def further(self, push: float, dt: float, integrator: str, ways: range) -> Iterator[tuple[str, int, Run]]:
         """How runs of further patterns fail, or "", what moves first, and the runs.
 
-        They are judged beside the fine runs of the first patterns, of which the fastest counts.
+        They are judged beside the fine runs of the first patterns, of which the fastest counts; what is in motion, also
+        beside that of their own pattern: which way it tumbles depends on the push.
         """
         fine = [self.fine_run(push, way) for way in range(WAYS)]
         most, last = (np.max([getattr(run, name) for run in fine], axis=0) for name in ("most", "last"))
@@ -408,7 +409,11 @@ class Pushed:
         lasts = self.lasts if len(self.motion.times) else SURELY * self.lasts
         for way in ways:
             run = self.run(push, way, dt, integrator, fast=fastest, lasts=lasts)
-            yield self.failure(run, whole, push, is_chance), self.first(run, most, push), run
+            why, own_most = self.failure(run, whole, push, is_chance), most
+            if why and self.is_in_motion:
+                own_most = np.maximum(most, self.fine_run(push, way, lasts).most)
+                why = self.failure(run, whole._replace(most=own_most), push, is_chance)
+            yield why, self.first(run, own_most, push), run
 
     def first(self, run: Run, most: np.ndarray, push: float) -> int:
         """The degree of freedom that is first faster than fine runs ever are, else the fastest at the end."""
