@@ -32,6 +32,10 @@ OF_ROUNDING, MOST_OF_ROUNDING = (
 DIVERGES = 1.05  # growth in a step that overflows in the thousands of steps of a run
 
 
+class NoReference(ValueError):
+    """A scene whose motion no method follows to its end."""
+
+
 class Reference(NamedTuple):
     """One run: every number as the sum of two doubles."""
 
@@ -61,7 +65,7 @@ def reference(case: Case) -> Reference:
         return in_doubles(case)._replace(why=str(error))
     except ValueError as error:
         reason = f"scene {case.name!r}: {error}; expected a slower start or a shorter scene"
-        raise ValueError(reason) from error
+        raise NoReference(reason) from error
     return Reference(times(case), path.high, path.low, apart, path.steps, case.coordinates)
 
 
@@ -109,7 +113,7 @@ def in_doubles(case: Case) -> Reference:
     apart, high, steps = min(runs, key=lambda run: np.nan_to_num(run[0], nan=np.inf))
     if not np.isfinite(apart):
         tried = f"scene {case.name!r}: runs with up to {runs[-1][2]} steps of {DOUBLES} diverge"
-        raise ValueError(f"{tried}; expected a slower start or a shorter scene")
+        raise NoReference(f"{tried}; expected a slower start or a shorter scene")
     return Reference(times(case), high, np.zeros_like(high), apart, steps, case.coordinates)
 
 

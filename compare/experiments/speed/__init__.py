@@ -10,7 +10,7 @@ from ...engines import GRID, IN_QUICK_RUNS, LABELS
 from ...judge.run import leaves_no_digits, movement_unit
 from ...judge.scale import EPS, FACTOR
 from ...robots import Robot
-from ...truth.reference import LOST, has_no_reference
+from ...truth.reference import LOST, NoReference, has_no_reference
 from .. import ALWAYS
 from ..setup import Setup, different_first
 from . import conclusions, evaluations
@@ -28,16 +28,23 @@ def skipped(robot: Robot) -> Finding | None:
     return leaves_no_digits(robot) or has_no_reference(robot)
 
 
-def begin(setup: Setup) -> Iterable[SceneRuns]:
+def begin(setup: Setup) -> Iterable[SceneRuns | NoReference]:
     """Start measuring the errors of MuJoCo and tmt, in parallel with other work: they are timed later."""
     cases = followed(setup.robot, setup.size)
     return setup.map(partial(scene_runs, engines=setup.engines, size=setup.size), different_first(cases))
 
 
-def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
-    """Errors, times, orders, the error of rounding, and the cheapest settings."""
-    names = [case.name for case in setup.robot.cases]
-    scenes = sorted(begin(setup) if work is None else work, key=lambda scene: names.index(scene.case.name))
+def rows(setup: Setup, work: Iterable[SceneRuns | NoReference] | None = None) -> SpeedResult:
+    """Errors, times, orders, the error of rounding, and the cheapest settings. A scene without reference is not judged."""
+    names, found = [case.name for case in setup.robot.cases], [*(begin(setup) if work is None else work)]
+    known = [scene for scene in found if isinstance(scene, SceneRuns)]
+    scenes = sorted(known, key=lambda scene: names.index(scene.case.name))
+    without = [str(reason) for reason in found if isinstance(reason, NoReference)]
+    if regular_of(setup.robot).name not in [scene.case.name for scene in scenes]:
+        result = SpeedResult("speed", shown=[])
+        for reason in without:
+            result.not_judged("", "errors over time", reason)
+        return result
     loops = evaluations.loops(setup)
     setup.quiet()  # nothing else may run while times are taken
     for scene in scenes:
@@ -47,6 +54,8 @@ def rows(setup: Setup, work: Iterable[SceneRuns] | None = None) -> SpeedResult:
         take_times(scene.case, [row for row in called if row.time < timing.TIMED_ENOUGH], setup.engines)
         scene.rows += called
     result = judged(setup, scenes)
+    for reason in without:
+        result.not_judged("", "errors over time", reason)
     result.tables["what_should_i_use"] = conclusions.what_to_use(result)
     result.headline = result.finding("headline", uses=uses(result))
     result.top.append(result.finding("answer", uses=uses(result)))

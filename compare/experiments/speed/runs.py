@@ -20,7 +20,7 @@ from ...judge.rounding import growth
 from ...judge.run import movement_unit
 from ...judge.scale import EPS
 from ...robots.case import Case
-from ...truth.reference import Reference, coarsest_steps, reference
+from ...truth.reference import NoReference, Reference, coarsest_steps, reference
 from ..runs import follow
 from .settings import budget, methods, settings_of
 
@@ -90,10 +90,14 @@ class SpeedResult(Result):
     servos_off: bool = False  # whether the robot has servos, which do not act in the regular scene
 
 
-def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRuns:
-    """The runs of a scene by compiled methods, whose times are taken later."""
-    exact = reference(case)
-    scene = SceneRuns(case, exact, max(floor(case, engines["tmt"].of(case)), exact.apart))
+def scene_runs(case: Case, engines: Mapping[str, Engine], size: str) -> SceneRuns | NoReference:
+    """The runs of a scene by compiled methods, whose times are taken later; or why it has no reference."""
+    try:
+        exact = reference(case)
+        rounded = floor(case, engines["tmt"].of(case))
+    except NoReference as error:
+        return error
+    scene = SceneRuns(case, exact, max(rounded, exact.apart))
     scene.rows = rows_of(scene, engines, size, compiled=True)
     for row in scene.rows:
         row.seconds = None
@@ -165,7 +169,7 @@ def measure(
 def floor(case: Case, dynamics: Dynamics) -> float:
     """The error of the angles that rounding leaves, rad: eps times the largest growth of a small difference.
 
-    dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; ValueError if the run diverges.
+    dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; NoReference if the run diverges.
     """
     recorded = GROWTH_STEPS * GRID
     first = recorded * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // recorded))
@@ -177,7 +181,7 @@ def floor(case: Case, dynamics: Dynamics) -> float:
             grown = growth(METHODS["rk4"], case.tree, run.q, run.v, case.tau, dt, GROWTH_STEPS, stride)
             return float(EPS * 10.0 ** grown.max() * max(1.0, np.abs(run.q).max()))
     reached = f"scene {case.name!r}: RK4 with {steps} steps does not reach its end"
-    raise ValueError(f"{reached}; expected a shorter scene")
+    raise NoReference(f"{reached}; expected a shorter scene")
 
 
 def prepared(case: Case, row: RunRow, engines: Mapping[str, Engine]) -> tuple[Callable[[], object], float]:

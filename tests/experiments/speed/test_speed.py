@@ -96,6 +96,18 @@ def test_beyond_the_digits_of_the_reference_nothing_is_judged(engines, of_bent, 
     assert runs.scene_runs(BENT, engines, "small").floor == 1e-6
 
 
+def test_a_scene_that_diverges_is_not_judged_and_the_others_are(engines, of_bent, monkeypatch):
+    monkeypatch.setattr(runs, "reference", lambda case: of_bent.reference)
+    without = runs.scene_runs(BENT.changed(speed=(1e7, 1e7, 1e7)), engines, "small")
+    assert isinstance(without, reference.NoReference) and "bent, free" in str(without)
+    setup, said = Setup.small(ARM, engines), str(without)
+    (check,) = speed.rows(setup, [without]).checks
+    assert not check.judged and check.note == said
+    result = speed.rows(setup, [runs.scene_runs(BENT, engines, "small"), without])
+    assert [check.note for check in result.checks if not check.judged] == [said] and len(result.checks) > 10
+    assert result.tables["what_should_i_use"] and all(check.passed for check in result.checks if check.judged)
+
+
 def test_a_run_without_timings_has_the_checks_only_and_sees_a_wrong_model(engines):
     result = untimed_speed(Setup.small(ARM, engines))
     assert len(result.checks) > 10 and all(check.passed for check in result.checks)
