@@ -71,7 +71,7 @@ def readable_lines(run) -> list[str]:
     """The screen in the end: nothing of the progress, which is in a line that is emptied, is left, and the cursor is back."""
     assert re.findall(r"\x1b\[\?25[lh]", run.output)[-1:] in ([], ["\x1b[?25h"])
     shown = re.sub(r"\x1b\[(\?25[lh]|[\d;]*m)", "", run.output.replace("\r\n", "\n"))
-    lines = re.sub(r"[^\n]*(\n\r\x1b\[1A|\r)\x1b\[2K\r?", "", shown).split("\n")
+    lines = re.sub(r"[^\n]*(\n\r\x1b\[1A|\r)\x1b\[2K(\r(\x1b\[2K)?)?", "", shown).split("\n")
     assert all(len(line) <= run.columns for line in lines) and not re.search("[\x1b\r]", "".join(lines))
     for left in ("Traceback", "imports", "(1 of 1)", "figures"):
         assert left not in words(lines)

@@ -102,7 +102,7 @@ if how == "import":
 def bias(q, qd):
     global calls
     calls += 1
-    if calls == 300 and how in ACTS:
+    if calls == 40 and how in ACTS:
         ACTS[how]()
     if how == "child":
         print("x" * 10_000)
