@@ -126,7 +126,16 @@ class Entries:
         brackets = np.zeros((len(self.q), *self.added.shape[1:]))
         for joint in self.tree.coordinates.balls:
             brackets[:, joint.qd, joint.qd] = np.abs(self.qd[:, joint.qd]).sum(axis=1)[:, None, None]
-        return self.force_rates(0.0)[1] + self.added @ brackets
+        return 2.0 * self.rates_by_speed + self.added @ brackets
+
+    @cached_property
+    def rates_by_speed(self) -> np.ndarray:
+        """Of half of the derivative of the bias by qd, (states, nv, nv)."""
+        stretched = self.mass * self.spin
+        by_speed = np.einsum("sb,sbi,sbj->sij", stretched, self.t, np.broadcast_to(self.t, (*self.spin.shape, self.t.shape[2])))
+        by_speed += np.einsum("sb,sbi,bj->sij", self.mass * self.speed, self.t, self.turns)
+        by_speed += np.einsum("sb,bi,bj->sij", self.inertia * self.spin, self.turns, self.turns)
+        return by_speed + np.einsum("sb,bi,bj->sij", self.mass * self.slip, self.turns, self.slides)
 
     def regressor(self, qdd: ArrayLike) -> np.ndarray:
         """Of a torque for a unit of mass, first moment or inertia of a body, (states, nv, 10 m)."""
@@ -214,14 +223,9 @@ class Entries:
         by_movement = 4.0 * (
             of_turn.transpose(0, 2, 1) @ self.turns + of_slide.transpose(0, 2, 1) @ self.slides
         )
-        stretched = self.mass * self.spin
-        by_speed = np.einsum("sb,sbi,sbj->sij", stretched, self.t, np.broadcast_to(self.t, of_turn.shape))
-        by_speed += np.einsum("sb,sbi,bj->sij", self.mass * self.speed, self.t, self.turns)
-        by_speed += np.einsum("sb,bi,bj->sij", self.inertia * self.spin, self.turns, self.turns)
-        by_speed += np.einsum("sb,bi,bj->sij", self.mass * self.slip, self.turns, self.slides)
         stiffness = np.diag(np.array(tree.stiffness)[self.of_speed]) + np.abs(tree.position_gain or 0.0)
         damping = np.diag(tree.damping) + np.abs(tree.speed_gain or 0.0)
-        return by_movement + stiffness, 2.0 * by_speed + damping
+        return by_movement + stiffness, 2.0 * self.rates_by_speed + damping
 
     def solved(self, right: np.ndarray, solution: np.ndarray) -> np.ndarray:
         """Of X with Mbar X = right, (states, nv, columns): |Mbar^-1| times the sizes of both sides."""

@@ -266,6 +266,26 @@ def test_slower_contacts_are_slower_wherever_their_time_is_stated(kind):
         assert stiffness[0] == pytest.approx(FACTOR**2 * stiffness[1])
 
 
+def test_contacts_that_state_stiffness_and_damping_are_no_slower_beside_others_that_state_times():
+    geoms = '<geom size="1" solref="0.02 1"/><geom size="1" solref="-1000 -50"/>'
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
+    slower = changes.with_slower_contacts(model, FACTOR)
+    assert slower.geom_solref.tolist() == [[FACTOR * 0.02, 1.0], [-1000.0, -50.0]]
+
+
+def test_masses_that_are_stated_as_compiled_do_not_change_with_what_else_there_is():
+    rods = "".join(f'<body name="{name}"><joint/><geom size="{r}"/></body>' for name, r in (("a", 0.1), ("b", 0.2)))
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco><compiler settotalmass="3"/><worldbody>{rods}</worldbody></mujoco>'
+    )
+    model = spec.compile()
+    changes.state_as_compiled(spec, model, range(model.nbody))
+    spec.delete(spec.body("b"))
+    alone = spec.compile()
+    assert alone.body("a").mass == model.body("a").mass < 1.0
+    assert np.allclose(alone.body("a").inertia, model.body("a").inertia, rtol=1e-15)
+
+
 def test_changes_are_of_a_copy_and_of_what_they_name():
     model = mujoco.MjModel.from_xml_path(str(PATHS["quadruped"]))
     full, heavier_full = np.zeros((2, model.nv, model.nv))

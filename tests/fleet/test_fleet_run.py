@@ -155,6 +155,7 @@ def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):
     assert first.executor.calls == ["m/a.xml", "m/c.mjcf", "m/x/whole.xml", "m/z/whole.xml"]
     copies = {row.file: row.same_as for row in first.of.rows if row.same_as}
     assert copies == {"m/b.xml": "m/a.xml", "m/y/whole.xml": "m/x/whole.xml"} and len(first.of.rows) == 6
+    assert (first.rows["a.xml"].seconds, first.rows["b.xml"].seconds) == (1.0, 0.0)
     assert "m/a.xml" in first.rows["b.xml"].reason and first.rows["b.xml"].verdict == AGREE
     assert fleet({}, answer=agrees).rows["b.xml"] == first.rows["b.xml"]
 

@@ -61,6 +61,14 @@ def test_patterns_and_lists(here):
     assert names("@list.txt") == ["m/b c.xml", "n/a[1].xml"]
 
 
+def test_a_part_that_is_named_is_a_model_too(here):
+    here("m/part.xml")
+    here("m/whole.xml", "<mujoco><include file='part.xml'/></mujoco>")
+    assert names("m") == ["m/whole.xml"] and left_out("m") == {"m/part.xml": "included by m/whole.xml"}
+    assert names("m/whole.xml", "m/part.xml") == ["m/part.xml", "m/whole.xml"] == names("m", "m/part.xml")
+    assert left_out("m", "m/part.xml") == {}
+
+
 @pytest.mark.parametrize("asked, says", [
     (["m/a.xml", "m/*.mjcf"], r"m/\*.mjcf"), (["m\n\0"], r"m\\n\\x00"), (["@m"], "list m"), (["@bad.txt"], "m/c.xml"),
 ])  # fmt: skip

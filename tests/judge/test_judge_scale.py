@@ -153,6 +153,41 @@ def test_rates_of_forces_sum_what_a_movement_changes_in_each_term():
     assert np.allclose(by_qd, summed(by_speed) + np.diag(TREE.damping), rtol=1e-13)
 
 
+def test_the_whole_robot_sums_its_bodies():
+    """The centre of mass and its Jacobian are for a unit of mass; a momentum has the lever from the common centre."""
+    total, far = sum(TREE.mass), apart(TREE) + np.max(REACH, axis=0) / 64
+    linear = summed(lambda b, s: TREE.mass[b] * MOVES[b])
+    angular = summed(lambda b, s: TREE.mass[b] * far[b] * MOVES[b] + LARGEST[b] * TURNS[b])
+    com = summed(lambda b, s: TREE.mass[b] * REACH[s, b])
+    assert np.allclose(OF.com, com[:, None] / total, rtol=1e-13)
+    assert np.allclose(OF.com_jacobian[:, 0], linear / total, rtol=1e-13)
+    rows = OF.centroidal_momentum_matrix
+    assert np.allclose(rows[:, :3], linear[:, None], rtol=1e-13)
+    assert np.allclose(rows[:, 3:], angular[:, None], rtol=1e-13)
+
+
+def test_a_coriolis_matrix_has_no_damping_and_a_balls_brackets():
+    def by_speed(b, s):
+        S, V, w = moving_of(b, s)
+        of_point = TREE.mass[b] * (S * np.outer(MOVES[b], MOVES[b]) + w * np.outer(MOVES[b], TURNS[b]))
+        of_turn = LARGEST[b] * S * TURNS[b] + TREE.mass[b] * V * SLIDES[b]
+        return 2.0 * (of_point + np.outer(TURNS[b], of_turn))
+
+    brackets = np.zeros((2, 6, 6))
+    brackets[:, 2:5, 2:5] = np.abs(QD[:, 2:5]).sum(axis=1)[:, None, None]
+    assert np.allclose(OF.coriolis_matrix, summed(by_speed) + OF.added @ brackets, rtol=1e-13)
+
+
+def test_a_column_of_the_regressor_is_what_a_unit_of_its_number_pushes():
+    qdd = np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0], [0.5, 0.0, -1.0, 0.0, 2.0, 7.0]])
+    found = OF.regressor(qdd).reshape(2, 6, 3, 10)
+    for s, b in np.ndindex(2, 3):
+        (S, V, w), sizes = moving_of(b, s), np.abs(qdd[s])
+        turning, a = TURNS[b] @ sizes + S**2, MOVES[b] @ sizes + 2.0 * S * w + V * S + 5.0
+        columns = [a * MOVES[b], *3 * [turning * MOVES[b] + a * TURNS[b]], *6 * [turning * TURNS[b]]]
+        assert np.allclose(found[s, :, b], COUNT[b] * np.transpose(columns), rtol=1e-13)
+
+
 def test_rates_of_the_force_of_a_pendulum_are_at_most_a_few_of_its_own():
     """d(tau)/dq of a bob of 2 kg at 0.5 m is at most m g l, d(tau)/dqd is 0: neither scale is far above the terms."""
     bob = one_body([(0.0, 1.0, 0.0)], com=(0.0, 0.0, -0.5), mass=[2.0], inertia=1e-9 * np.eye(3))

@@ -155,3 +155,11 @@ def test_finite_numbers_give_finite_results_or_a_reason(state):
     assert not np.isnan(tmt.energy(tmt.ARM, q, qd))
     motion = tmt.simulate(tmt.ARM, q, qd, tau, 0.01, 3)
     assert (motion.ended is None) == bool(np.isfinite(motion.q).all() and np.isfinite(motion.qd).all())
+
+
+@pytest.mark.parametrize("q", [[np.nan, 0.0, 0.0], [[np.nan, np.nan, np.nan], [0.0, np.nan, 0.0]]])
+def test_the_energy_of_a_state_of_which_some_is_no_number_is_refused(q):
+    """Where all of it is NaN a run has ended, and so has its energy."""
+    with pytest.raises(ValueError):
+        tmt.energy(tmt.ARM, q, np.zeros(np.shape(q)))
+    assert np.isnan(tmt.energy(tmt.ARM, np.full(np.shape(q), np.nan), np.zeros(np.shape(q)))).all()

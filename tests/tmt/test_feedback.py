@@ -93,6 +93,13 @@ def test_what_is_no_torque_is_said(word):
     assert word in str(error.value) and "\n" not in str(error.value)
 
 
+def test_a_run_that_is_driven_away_ends_where_its_last_state_is():
+    with np.errstate(over="ignore"):
+        run = tmt.simulate(tmt.ARM, START, REST, lambda t, q, qd: 1e4 * q**3, 0.01, 100)
+    last = np.flatnonzero(np.isfinite(run.q).all(axis=1))[-1]
+    assert 0 < last < 50 and run.ended.startswith(f"at t = {0.01 * last:g} s")
+
+
 @pytest.mark.parametrize("method", ["dopri8_adaptive", "implicit_midpoint", "taylor"])
 def test_a_method_that_cannot_ask_it_is_refused(method):
     with pytest.raises(ValueError, match="rk4"):
