@@ -13,7 +13,7 @@ from ..engines.mujoco.names import element_name
 from ..engines.mujoco.reading import Reading
 from .motion import Posture, motion_of
 from .push import DAMPED, FAST, PUSHES, USUAL, WAYS, WITHIN, Limit, Pushed
-from .remedies import Remedy, creep_stops, remedies
+from .remedies import Remedy, creep_stops, remedies, shorter_steps
 from .search import largest
 
 DRAWN = (0.03, 0.1, 0.3)  # rad/s or m/s: pushes of the picture
@@ -151,7 +151,7 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
                 pushed.limit(push, name, surely=push == pushed.push)
     smaller = None
     if question.helped and own and own.stable_at_file_dt is False:
-        found = remedies(pushed) if period is None else []
+        found = remedies(pushed) if period is None else shorter_steps(pushed)
         smaller = smaller_push(pushed, own)
     if question.helped and rows[0].creep_rad_per_s > CREEPS:
         stops = creep_stops(pushed, pushed.creep()[1])

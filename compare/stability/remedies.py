@@ -14,6 +14,7 @@ from .search import largest
 ITERATIONS = 2, 4, 10, 50  # of the solver
 NOSLIP, IMPRATIO = 10, 100.0  # that stop a creep
 WITHIN = 1.2  # fold: how closely the least strength of a change is found
+PARTS = 2, 4, 10  # of a step, while a program's period stays
 TIMED = 200  # steps
 Change = Callable[[mujoco.MjModel, float], mujoco.MjModel | None]  # None: the file has nothing to change
 
@@ -59,6 +60,15 @@ def remedies(pushed: Pushed) -> list[Remedy]:
         if changed is not None and (remedy := confirmed(pushed, changed, name, least or 0.0)):
             found.append(remedy)
     return found
+
+
+def shorter_steps(pushed: Pushed) -> list[Remedy]:
+    """The longest part of the step in use, in ms, with which the program's period holds, if one does."""
+    for dt in (pushed.dt / parts for parts in PARTS):
+        verdict = pushed.verdict(pushed.push, dt, pushed.integrator, pushed.period, pushed.delay)
+        if verdict.holds:
+            return [Remedy("timestep", 1e3 * dt, verdict.speed)]
+    return []
 
 
 def comes_to_rest(pushed: Pushed, model: mujoco.MjModel) -> bool:

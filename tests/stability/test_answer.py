@@ -76,6 +76,19 @@ def test_where_no_period_or_every_one_is_stable_that_is_said():
     )
 
 
+@pytest.mark.parametrize("stiffness, ms", [(980.0, [10.0]), (5000.0, [5.0]), (1e6, [])])
+def test_a_shorter_step_in_the_same_period_is_a_remedy(stiffness, ms):
+    """A stiff spring beside the motor: a semi-implicit step holds below 2 / sqrt(stiffness / inertia)."""
+    of_mass = f'<inertial pos="0 0 0" mass="1" diaginertia="{INERTIA} {INERTIA} {INERTIA}"/>'
+    spring = f'<body><joint axis="0 0 1" stiffness="{stiffness}" damping="0.5"/>{of_mass}</body>'
+    text = hinge(MOTOR, dt=0.02).replace("</worldbody>", f"{spring}</worldbody>")
+    found = asked(text, control_period=0.04, kp=5.0, kv=0.5)
+    assert found.rows[0].stable_at_file_dt is False
+    assert [(remedy.change, remedy.number) for remedy in found.remedies] == [("timestep", dt) for dt in ms]
+    limits = [2e3 / np.sqrt(stiffness / INERTIA) > 20.0 / parts for parts in (1, 2, 4, 10)]
+    assert limits.index(True) == (2, 4).index(20.0 / ms[0]) + 1 if ms else not any(limits)
+
+
 def test_a_program_needs_an_actuator():
     with pytest.raises(ValueError, match="--kp"):
         asked(hinge(MOTOR), control_period=0.01)

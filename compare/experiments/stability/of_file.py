@@ -89,7 +89,7 @@ def add(result: StabilityResult, work: Work) -> None:
         stable = [row.integrator for row in first.rows if row.stable_at_file_dt]
         if first.smaller:
             tell(result, "smaller", row=first.rows[0], push=first.smaller[0], limit=first.smaller[1])
-        if stable or first.rows[0].of == "step":
+        if stable or first.remedies or first.rows[0].of == "step":
             tell(result, "remedies", row=first.rows[0], integrators=stable, remedies=first.remedies)
     if first.rows[0].creep_rad_per_s > CREEPS:
         tell(result, "creep", row=first.rows[0], stops=first.stops)

@@ -32,6 +32,7 @@ EDITS = (
     ("stability.motion", "Motion.parts", "done + late", "done", "a program's delay is none"),
     ("stability.motion", "Motion.parts", "done % every == 0", "True", "a program reads at every step"),
     ("stability.motion", "postures_of", "reading.keyframes", "list(reading.keyframes)[:6]", "six keyframes are postures"),
+    ("stability.remedies", "shorter_steps", "verdict.holds", "True", "any shorter step makes a period stable"),
     ("stability.remedies", "confirmed", "borne and verdict.holds", "True", "no remedy is run"),
     ("stability.answer", "period_limit", "max(1, round(_1))", "1", "every period is a step"),
     ("stability.answer", "worst_step", "row.integrator == row.file_integrator and _1", "_1",
