@@ -77,6 +77,13 @@ def test_a_quantity_of_mujoco_that_is_off_fails_its_own_checks(mujoco, experimen
     assert failing(experiment, Off(mujoco, quantity, **which)) == expected | compiled
 
 
+def test_states_that_are_left_out_are_said(mujoco, monkeypatch):
+    monkeypatch.setattr("compare.robots.states.MOST_NUMBERS", 4 * 3 * 2 * 3)  # of T_b: 4 states
+    result = mass.rows(setup_of(mujoco, make=Setup, states=10, exact_states=0, size="small"))
+    (note,) = [note for note in result.notes if note.kind == "fewer_states"]
+    assert (note.values["count"], note.values["states"]) == (4, 10)
+
+
 def test_a_mass_matrix_of_mujoco_that_is_not_definite_fails_its_own_check(mujoco, monkeypatch):
     monkeypatch.setitem(globals(), "off", lambda values, place: -values)
     (definiteness,) = failing(mass, Off(mujoco, "mass_matrix")) - {"Mbar", "Mbar, compiled"}

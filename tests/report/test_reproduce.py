@@ -140,6 +140,9 @@ def test_the_state_of_a_quantity_has_the_largest_share_of_its_tolerance(runs):
     assert len(rows) > 1 and rows.difference_over_bar.nunique() > 1
     share = pytest.approx(worst.difference_over_bar, rel=1e-9)
     assert state["quantity"] == "Mbar" and state["difference"] / state["tolerance"] == share
+    checks = re.search(r'"checks": \[(.*?)\]', runs["mass"].read_text(encoding="utf-8"), re.DOTALL)[1]
+    values = [json.loads(line.rstrip(","))["value"] for line in checks.split("\n") if line.strip()]
+    assert values and {*values} == {state["difference"]}  # no others
 
 
 @pytest.mark.parametrize("name", ["mass", "reduction"])

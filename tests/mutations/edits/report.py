@@ -7,6 +7,8 @@ EDITS = (
     ("verdict", "failures", "check.about == kind", "kind == About.PROGRAM", "every failure is a run that broke off"),
     ("verdict", "worst", "max(_1, *_2)", "min(_1, *_2)", "the best check is the worst"),
     ("verdict", "verdict", "top.value", "True", "a difference of zero is the largest share of a tolerance"),
+    ("reproduce", "script", "numbers & _1", "True", "checks that are not repeated are told as if they were"),
+    ("states", "rows", "comparison.sample.notes", "()", "it is not said that states are left out"),
     ("reproduce", "worst_states", "max(group, *_1)", "min(group, *_1)", "the best state is repeated"),
     ("verdict", "verdict", "top and top.value and not any(failing)", "top and top.value", "a failing check has a share"),
     ("run.examine", "Run.finished", "not drawing.exception()", "True", "a figure that broke ends what an interrupt leaves"),
