@@ -266,6 +266,20 @@ def test_slower_contacts_are_slower_wherever_their_time_is_stated(kind):
         assert stiffness[0] == pytest.approx(FACTOR**2 * stiffness[1])
 
 
+def test_what_has_fallen_asleep_moves_when_it_is_pushed():
+    """A state does not say what sleeps: beside the same file that never sleeps."""
+    text = """<mujoco><option><flag sleep="{}"/></option><worldbody><geom type="plane" size="5 5 1"/>
+    <body pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1"/></body></worldbody></mujoco>"""
+    runs = []
+    for sleeps in ("enable", "disable"):
+        model = mujoco.MjModel.from_xml_string(text.format(sleeps))
+        stepper = Stepper(model, 0.002, "Euler")
+        state = stepper.roll(stepper.start(), 1500).states
+        state[:, stepper.places["qvel"]] += 0.01
+        runs.append(stepper.roll(state, 50).q)
+    assert np.array_equal(*runs) and np.ptp(runs[0][0, :, 0]) > 0.0
+
+
 def test_contacts_that_state_stiffness_and_damping_are_no_slower_beside_others_that_state_times():
     geoms = '<geom size="1" solref="0.02 1"/><geom size="1" solref="-1000 -50"/>'
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")

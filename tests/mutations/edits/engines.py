@@ -25,5 +25,6 @@ EDITS = (
     ("timing", "is_timed", "scatter(taken) <= STEADY", "True", "one disturbed call is a time"),
     ("engines.outside", "OutsideDynamics.at", "tau - passive(*_1)", "tau", "damping is forgotten"),
     ("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
+    ("mujoco.stepper", "Stepper.__init__", "~SLEEP", "-1", "what sleeps stays asleep"),
     ("mujoco.whole", "Whole.__init__", "model.body_treeid >= 0", "model.body_weldid > 0", "a mocap body is a part of the whole"),
 )  # fmt: skip
