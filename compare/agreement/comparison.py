@@ -135,7 +135,7 @@ class Comparison:
         for name, value in (self.brought | {"qd": qd, "tau": tau}).items():
             if value is not None and name not in functions:
                 expected = f"a function, or q of shape (states, {self.coordinates.nq})"
-                raise ValueError(f"{name} is {shown(value)}, but not q is given; expected {expected}")
+                raise ValueError(f"{name} is {shown(value)}, and q is not given; expected {expected}")
         self.take_random(states, seed)
 
     def read(self, mjcf: Any) -> None:
