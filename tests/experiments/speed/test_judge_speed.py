@@ -121,6 +121,19 @@ def test_a_higher_order_is_said_and_fails_only_where_tmts_same_scheme_has_anothe
     assert ("with order 5.00 (stated: 4)" in said) == bool(higher)
 
 
+@pytest.mark.parametrize("finer, judged", [((0.05, 0.37), []), ((0.05, 1.0, 1.0, 1.0), [False, True])])
+def test_errors_that_rest_at_coarse_steps_are_no_order_where_tmts_same_scheme_goes_on_to_fall(finer, judged):
+    """Of a file with a stiff mode: coarse steps have the same error, as fine ones do in tmt, which are more."""
+    coarse = falling(0.02, 0.05)
+    finest = coarse[-1] / 2.0 ** np.cumsum(finer)
+    found = series("mujoco", "RK4", coarse) + series("tmt", "rk4", [*coarse, *finest])
+    for row in found:
+        row.order = 1
+    result = SpeedResult("speed")
+    conclusions.check_orders(result, [scene_of(found, 1e-16, True)], ["mujoco", "tmt"])
+    assert [check.passed for check in result.checks] == judged
+
+
 def result_of(rows) -> SpeedResult:
     result = SpeedResult("speed", rows=rows, floors={"bent, free": 1e-16}, regular="bent, free")
     result.tables["what_should_i_use"] = conclusions.what_to_use(result)

@@ -41,4 +41,5 @@ EDITS = (
     # engines
     ("engines", "as_far_as_it_goes", "t[int(np.argmin(finite)) - 1]", "t[0]", "every run ends at its start"),
     ("engines.tmt", "TmtDynamics.prepare", "path[0, ::every]", "path[0, -65:]", "a timed run is read at its end"),
+    ("speed.conclusions", "check_orders", "row.scheme in unsettled", "False", "errors that rest at coarse steps have an order"),
 )  # fmt: skip
