@@ -132,7 +132,9 @@ class Entries:
     def rates_by_speed(self) -> np.ndarray:
         """Of half of the derivative of the bias by qd, (states, nv, nv)."""
         stretched = self.mass * self.spin
-        by_speed = np.einsum("sb,sbi,sbj->sij", stretched, self.t, np.broadcast_to(self.t, (*self.spin.shape, self.t.shape[2])))
+        by_speed = np.einsum(
+            "sb,sbi,sbj->sij", stretched, self.t, np.broadcast_to(self.t, (*self.spin.shape, self.t.shape[2]))
+        )
         by_speed += np.einsum("sb,sbi,bj->sij", self.mass * self.speed, self.t, self.turns)
         by_speed += np.einsum("sb,bi,bj->sij", self.inertia * self.spin, self.turns, self.turns)
         return by_speed + np.einsum("sb,bi,bj->sij", self.mass * self.slip, self.turns, self.slides)

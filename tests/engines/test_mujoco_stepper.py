@@ -288,7 +288,9 @@ def test_contacts_that_state_stiffness_and_damping_are_no_slower_beside_others_t
 
 
 def test_masses_that_are_stated_as_compiled_do_not_change_with_what_else_there_is():
-    rods = "".join(f'<body name="{name}"><joint/><geom size="{r}"/></body>' for name, r in (("a", 0.1), ("b", 0.2)))
+    rods = "".join(
+        f'<body name="{name}"><joint/><geom size="{r}"/></body>' for name, r in (("a", 0.1), ("b", 0.2))
+    )
     spec = mujoco.MjSpec.from_string(
         f'<mujoco><compiler settotalmass="3"/><worldbody>{rods}</worldbody></mujoco>'
     )
