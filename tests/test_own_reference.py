@@ -105,7 +105,9 @@ def test_one_slip_is_one_cause_beneath_the_first_experiment_that_differs(folder,
 
 def test_what_is_not_finite_is_said_before_causes_and_nothing_is_said_to_be_mended(folder, capsys):
     """h[hip] is NaN, h[knee] is 0: the latter has a cause."""
-    (folder / "holed.py").write_text("from mine import *\n\nholed = changed(bias=lambda q, v: np.array([np.nan, 0.0]))\n")
+    (folder / "holed.py").write_text(
+        "from mine import *\n\nholed = changed(bias=lambda q, v: np.array([np.nan, 0.0]))\n"
+    )
     with without_workers():
         status, out, _ = answered(
             ["all", "--quick", "--mjcf", "double.xml", "--reference", "holed.py:holed"], capsys

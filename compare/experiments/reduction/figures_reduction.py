@@ -26,5 +26,9 @@ def draw_models(result: Result, rows: Sequence[ModelRow]) -> tuple[str, Figure, 
     else:
         ax.set_xticks([0.0])
     ax.margins(0.2)
-    ax.set(ylim=(0.0, 1.2 * max(row.step or 0.0 for row in rows) or None), xlabel="error, rad or m", ylabel="time of a step, us")
+    ax.set(
+        ylim=(0.0, 1.2 * max(row.step or 0.0 for row in rows) or None),
+        xlabel="error, rad or m",
+        ylabel="time of a step, us",
+    )
     return "reduction_models", fig, result.finding("models")
