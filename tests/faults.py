@@ -47,7 +47,7 @@ def derived(tree: tmt.Tree, q, qd, factors: dict | None = None, slip: str = "", 
     """Mbar (states, nv, nv) and h (states, nv), with factors {(body, term): number} and one slip in some bodies."""
     (T, B), w = literal.jacobians(tree, q), literal.angular_velocities(tree, q, qd)
     (a, alpha), M, h = literal.convective_terms(tree, q, qd), 0.0, 0.0
-    turns = [frame.turn for frame in method.joint_frames(tree, list(q.T))]
+    turns = [frame.rotation for frame in method.joint_frames(tree, list(q.T))]
     for b, mass in enumerate(tree.mass):
         factor = {term: (factors or {}).get((b, term), 1.0) for term in OF_TERM}
         I, c, slips = np.array(tree.inertia[b]), np.array(tree.com[b]), slip if b in bodies else ""

@@ -252,7 +252,7 @@ THREE = np.zeros((3, 2))
 
 @pytest.mark.parametrize("brought, word", [
     ({}, "acceleration"), ({"bias": bias, "rtol": -1.0}, "rtol is -1.0"), ({"bias": bias, "states": 2.5}, "states is 2.5"),
-    ({"bias": THREE}, "bias .* not q"), ({"bias": bias, "qd": 0.0}, "qd .* not q"), ({"bias": "h"}, "bias is 'h'"),
+    ({"bias": THREE}, "bias .* not given"), ({"bias": bias, "qd": 0.0}, "qd .* not given"), ({"bias": "h"}, "bias is 'h'"),
     ({"acceleration": acceleration, "q": THREE, "qd": 0.0}, "depends on tau"), ({"mjcf": 3, "bias": bias}, "int"),
     ({"bias": bias, "q": THREE, "qd": np.eye(2)}, r"qd has shape \(2, 2\); expected \(3, 2\)"),
     ({"bias": bias, "q": [[0, np.nan]], "qd": 0.0}, "finite"), ({"bias": bias, "q": [["a", "b"]], "qd": 0.0}, "q is "),

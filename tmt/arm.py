@@ -38,5 +38,5 @@ ARM = Tree(
 def points(q: Sequence[float]) -> list[Vector]:
     """Shoulder, elbow and finger tips in the world, Vectors in m, at joint angles q (3 scalars, rad)."""
     frames = joint_frames(ARM, q)
-    elbow, turn = frames[2].origin, frames[2].turn
-    return [frames[0].origin, elbow, elbow + turn @ Vector(E, 0.0, 0.0)]
+    elbow, rotation = frames[2].origin, frames[2].rotation
+    return [frames[0].origin, elbow, elbow + rotation @ Vector(E, 0.0, 0.0)]

@@ -85,11 +85,11 @@ class Equations:
 
     def frame_of(self, body: int) -> Frame:
         site = self.tree.site_of(self.tree.body_names[body])
-        return Frame(np.array(site.offset), whole(np.array(site.turn, float)))
+        return Frame(np.array(site.offset), whole(np.array(site.rotation, float)))
 
     def axes_at(self, joint: int) -> ndarray:
         """The axes of the file's body that a joint moves, as columns; else of the body that it carries."""
-        of_joints = dict(zip(self.tree.site_joint[::-1], self.tree.site_turn[::-1]))
+        of_joints = dict(zip(self.tree.site_joint[::-1], self.tree.site_rotation[::-1]))
         carried = (
             k for k in range(joint, len(self.tree.parent)) if k in of_joints and joint in self.tree.path(k)
         )

@@ -178,7 +178,7 @@ def drawn_at(stated: tmt.Tree, reference: Sequence[float]) -> tmt.Tree:
     frames = joint_frames(stated, q)
     anchors = np.array([tuple(frame.origin) for frame in frames])
     axes = np.array([tuple(axis) for frame in frames for axis in frame.axes])
-    turns = np.array([[list(row) for row in frames[joint].turn] for joint in at])
+    turns = np.array([[list(row) for row in frames[joint].rotation] for joint in at])
     centres = anchors[at] + np.einsum("bij,bj->bi", turns, stated.com)
     return with_frames(stated, anchors, axes, centres, turns, reference=tuple(reference))
 

@@ -148,7 +148,7 @@ def test_stages_that_are_solved_for_have_the_derivatives_of_50_digits(rng):
 
 def with_site(tree, joint, rng):
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
-    turns = {"site_offset": rng.normal(size=(1, 3)), "site_turn": [turn * np.linalg.det(turn)]}
+    turns = {"site_offset": rng.normal(size=(1, 3)), "site_rotation": [turn * np.linalg.det(turn)]}
     return dataclasses.replace(tree, site_names=["tool"], site_joint=[joint], **turns)
 
 

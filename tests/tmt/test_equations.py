@@ -72,7 +72,7 @@ def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
 
     def turns(q):
         frames = method.joint_frames(tree, list(q))
-        return np.array([[list(row) for row in frames[joint].turn] for joint in tree.body_joint])
+        return np.array([[list(row) for row in frames[joint].rotation] for joint in tree.body_joint])
 
     T, B = tmt.jacobians(tree, q)
     assert_close(T, by_each(tree, lambda q: tmt.com_positions(tree, q), q))

@@ -128,7 +128,7 @@ def test_parameters_are_those_of_the_tree_that_has_these_numbers(tree, rng):
     axes, origin = np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=3)
     axes[:, 0] *= np.linalg.det(axes)
     joint = tree.body_joint[-1:]
-    tree = replace(tree, site_names=(body,), site_joint=joint, site_offset=(origin,), site_turn=(axes,))
+    tree = replace(tree, site_names=(body,), site_joint=joint, site_offset=(origin,), site_rotation=(axes,))
     tensors = [np.trace(S) * np.eye(3) - S for S in (root @ root.T for root in rng.normal(size=(2, 3, 3)))]
     six = [[I[0, 0], I[1, 1], I[2, 2], I[0, 1], I[0, 2], I[1, 2]] for I in tensors]
     masses, coms, gravity = rng.uniform(1, 2, (2, 1)), rng.normal(size=(2, 3)), rng.normal(size=3)
@@ -164,7 +164,7 @@ def test_a_body_keeps_its_own_frame_where_a_site_of_its_name_is_on_another_joint
     place = {
         "site_names": ["forearm", "a b", "a_b"],
         "site_offset": [(1.0, 2.0, 3.0)] * 3,
-        "site_turn": [turn] * 3,
+        "site_rotation": [turn] * 3,
     }
     for joint in (-1, 0, 1, 2):
         tree = replace(tmt.ARM, site_joint=[joint] * 3, **place)
@@ -191,7 +191,7 @@ def test_the_head_says_where_each_number_stands_and_what_parameters_are_in_the_m
         [(0, 0, 1), *np.eye(3), (0, 1, 0)], ["slide", "ball", "hinge"], (0.3, 0.2, 0.1), np.diag([1.0, 2.0, 2.5]),
         armature=[0.0] * 4 + [0.1],
         site_names=["body"], site_joint=[2], site_offset=[(1.0, 2.0, 3.0)],
-        site_turn=[((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
+        site_rotation=[((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))],
     )  # fmt: skip
     text = tmt.equations(
         tree, "c header", ["bias"], name="thing", parameters=["body", "gravity"], head=["Said first."]

@@ -18,7 +18,7 @@ of Mbar with n times the length of the paths to the world.
 from typing import NamedTuple
 
 from .composite import Distribution, Round, rounded, turning
-from .mechanism import AnyTree, turn_in_parent
+from .mechanism import AnyTree, rotation_in_parent
 from .method import with_diagonal, with_rotors
 from .vectors import IDENTITY, ZERO, Matrix, Record, Rows, Scalar, Scalars, Values, Vector, combined, outer
 
@@ -39,25 +39,28 @@ class Symmetric(NamedTuple):
 class Screw(NamedTuple):
     """Angular velocity (or its rate) and velocity of the point at O; or moment and force about O."""
 
-    turn: Vector
-    shift: Vector
+    angular: Vector
+    linear: Vector
 
     def scaled(self, factor: Scalar) -> "Screw":
-        return Screw(self.turn * factor, self.shift * factor)
+        return Screw(self.angular * factor, self.linear * factor)
 
     def dot(self, other: "Screw") -> Scalar:
-        return self.turn.dot(other.turn) + self.shift.dot(other.shift)
+        return self.angular.dot(other.angular) + self.linear.dot(other.linear)
 
     def times(self, other: "Screw") -> "Screw":
         """The product of two motions: how the first changes the second, which it takes along."""
-        return Screw(self.turn.cross(other.turn), self.turn.cross(other.shift) + self.shift.cross(other.turn))
+        return Screw(
+            self.angular.cross(other.angular),
+            self.angular.cross(other.linear) + self.linear.cross(other.angular),
+        )
 
 
 STILL = Screw(ZERO, ZERO)
 
 
 class Frame(NamedTuple):
-    turn: Matrix
+    rotation: Matrix
     r: Vector  # of its origin
     omega: Vector
     omegad: Vector
@@ -83,8 +86,8 @@ class Rigid(NamedTuple):
     m: Scalar
 
     def accelerated(self, motion: Screw) -> Screw:
-        moment = self.J.times(motion.turn) + self.s.cross(motion.shift)
-        return Screw(moment, motion.turn.cross(self.s) + motion.shift * self.m)
+        moment = self.J.times(motion.angular) + self.s.cross(motion.linear)
+        return Screw(moment, motion.angular.cross(self.s) + motion.linear * self.m)
 
     @property
     def carried(self) -> Carried:
@@ -102,14 +105,14 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
     for i in reversed(range(len(joints))):
         body = bodies[i]
         for k, direction in reversed(list(zip(joints[i].speeds, frames[i].directions))):
-            moment = body.J.times(direction.turn) + body.H @ direction.shift
-            U = Screw(moment, body.M.times(direction.shift) + body.H.transposed @ direction.turn)
+            moment = body.J.times(direction.angular) + body.H @ direction.linear
+            U = Screw(moment, body.M.times(direction.linear) + body.H.transposed @ direction.angular)
             inverse = 1.0 / (direction.dot(U) + armature[k])
             u = (force[k] - direction.dot(body.force)) * inverse
             share = U.scaled(inverse)
             shares[k] = share, u
-            J, M = body.J.less_outer(share.turn, U.turn), body.M.less_outer(share.shift, U.shift)
-            body = Carried(combined(body.force, U.scaled(u)), J, body.H - outer(share.turn, U.shift), M)
+            J, M = body.J.less_outer(share.angular, U.angular), body.M.less_outer(share.linear, U.linear)
+            body = Carried(combined(body.force, U.scaled(u)), J, body.H - outer(share.angular, U.linear), M)
         if tree.parent[i] >= 0:
             bodies[tree.parent[i]] = combined(bodies[tree.parent[i]], body)
     result: Values = []
@@ -169,24 +172,24 @@ def outward(
         # what only slides carry: the point O of all that hangs on it moves with it
         still = only_slides[tree.parent[i]]
         only_slides[i] = still and joint.kind == "slide"
-        r = ZERO if still else p.r + p.turn @ Vector(*tree.offset[i])
+        r = ZERO if still else p.r + p.rotation @ Vector(*tree.offset[i])
         axes = [Vector(*axis) for axis in tree.axis[joint.qd]]
         if joint.kind == "slide":
-            axis = p.turn @ axes[0]
+            axis = p.rotation @ axes[0]
             r = r if still else r + axis * (q[joint.q.start] - tree.reference[i])
             a = p.a + p.omega.cross(axis) * (2.0 * qd[joint.qd.start])  # Coriolis
             a = a + axis * qdd[joint.qd.start] if qdd else a
-            frame = Frame(p.turn, r, p.omega, p.omegad, a, [Screw(ZERO, axis)])
+            frame = Frame(p.rotation, r, p.omega, p.omegad, a, [Screw(ZERO, axis)])
         else:
-            turn = p.turn @ turn_in_parent(tree, i, q)
-            carrier = turn if joint.kind == "ball" else p.turn
+            rotation = p.rotation @ rotation_in_parent(tree, i, q)
+            carrier = rotation if joint.kind == "ball" else p.rotation
             axes = [carrier @ axis for axis in axes]
             spin = sum((axis * rate for axis, rate in zip(axes, qd[joint.qd])), ZERO)
             omega, omegad = p.omega + spin, p.omegad + p.omega.cross(spin)
             omegad = sum((axis * rate for axis, rate in zip(axes, qdd[joint.qd])), omegad)
             # the acceleration is handed on where the joint is
             a = p.a + turning(p.omega, p.omegad) @ r - turning(omega, omegad) @ r
-            frame = Frame(turn, r, omega, omegad, a, [Screw(axis, r.cross(axis)) for axis in axes])
+            frame = Frame(rotation, r, omega, omegad, a, [Screw(axis, r.cross(axis)) for axis in axes])
         frames.append(frame)
         rigid.append(about_point(distributions[i], frame))
     return frames, rigid
@@ -194,10 +197,10 @@ def outward(
 
 def about_point(own: Distribution, frame: Frame) -> Rigid:
     m, r, omega, omegad, a = own.mass, frame.r, frame.omega, frame.omegad, frame.a
-    turned = frame.turn @ own.moment
+    turned = frame.rotation @ own.moment
     s = turned + r * m
     (x, xy, xz), (_, y, yz), (_, _, z) = outer(r, turned) + outer(s, r)
-    (A, D, E), (_, B, F), (_, _, C) = frame.turn @ own.inertia @ frame.turn.transposed
+    (A, D, E), (_, B, F), (_, _, C) = frame.rotation @ own.inertia @ frame.rotation.transposed
     J = Symmetric(Vector(A + (y + z), B + (x + z), C + (x + y)), Vector(F - yz, E - xz, D - xy))
     n = J.times(omegad) + omega.cross(J.times(omega)) + s.cross(a)
     return Rigid(Screw(n, a * m + turning(omega, omegad) @ s), J, s, m)

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import mpmath
 
 from .coordinates import Joint
-from .mechanism import AnyTree, origin_in_parent, turn_in_parent
+from .mechanism import AnyTree, origin_in_parent, rotation_in_parent
 from .method import with_diagonal, with_rotors
 from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, combined, outer, total_vector
 
@@ -42,8 +42,8 @@ class Distribution(NamedTuple):
         moment = self.moment + self.mass * by
         return Distribution(self.mass, moment, self.second + outer(by, self.moment) + outer(moment, by))
 
-    def turned(self, turn: Matrix) -> "Distribution":
-        return Distribution(self.mass, turn @ self.moment, turn @ self.second @ turn.transposed)
+    def turned(self, rotation: Matrix) -> "Distribution":
+        return Distribution(self.mass, rotation @ self.moment, rotation @ self.second @ rotation.transposed)
 
     @property
     def inertia(self) -> Matrix:
@@ -151,17 +151,17 @@ def along_axes(tree: AnyTree, joint: Joint, rates: Scalars) -> Vector:
 
 def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalars = ()) -> list[Motion]:
     result: list[Motion] = []
-    for i, (joint, (offset, turn)) in enumerate(zip(tree.coordinates.joints, placements)):
+    for i, (joint, (offset, rotation)) in enumerate(zip(tree.coordinates.joints, placements)):
         a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
         if tree.parent[i] >= 0:
-            parent, to_child = result[tree.parent[i]], turn.transposed
+            parent, to_child = result[tree.parent[i]], rotation.transposed
             a = parent.a + parent.P @ offset
             omega, omegad = to_child @ parent.omega, to_child @ parent.omegad
         moving = along_axes(tree, joint, qd)
         if joint.kind == "slide":
             a = a + omega.cross(moving * 2.0)
         else:
-            a, omegad, omega = turn.transposed @ a, omegad + omega.cross(moving), omega + moving
+            a, omegad, omega = rotation.transposed @ a, omegad + omega.cross(moving), omega + moving
         if qdd:
             more = along_axes(tree, joint, qdd)
             a, omegad = (a + more, omegad) if joint.kind == "slide" else (a, omegad + more)
@@ -193,8 +193,8 @@ def mass_matrix_and_bias(
                 for other in joints[j].speeds:
                     M[k][other] = M[other][k] = axes[other].dot(acts)
         if parent >= 0:
-            offset, turn = placements[i]
-            carried = combined(uneven[i].turned(turn), even[i]).moved(offset)
+            offset, rotation = placements[i]
+            carried = combined(uneven[i].turned(rotation), even[i]).moved(offset)
             uneven[parent] = combined(uneven[parent], carried)
     h = inward(tree, placements, motions(tree, placements, qd), own)
     return with_diagonal(M, tree.armature), h
@@ -207,7 +207,7 @@ def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, numb
 
 
 def placed(tree: AnyTree, q: Scalars) -> list[Placement]:
-    return [(origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)) for i in range(len(tree.parent))]
+    return [(origin_in_parent(tree, i, q), rotation_in_parent(tree, i, q)) for i in range(len(tree.parent))]
 
 
 def inward(
@@ -223,8 +223,8 @@ def inward(
         for k in joint.speeds:
             result[k] = Vector(*tree.axis[k]).dot(forces[i] if joint.kind == "slide" else moments[i])
         if parent >= 0:
-            offset, turn = placements[i]
-            force, moment = handed_down(offset, turn, forces[i], moments[i])
+            offset, rotation = placements[i]
+            force, moment = handed_down(offset, rotation, forces[i], moments[i])
             forces[parent], moments[parent] = forces[parent] + force, moments[parent] + moment
     return result
 
@@ -247,9 +247,9 @@ def rounded_once(tree: AnyTree, number: Round) -> tuple[list[Distribution], ...]
     return tuple([part.rounded(number) for part in parts] for parts in (exact, uneven, even))
 
 
-def handed_down(offset: Vector, turn: Matrix, force: Vector, moment: Vector) -> tuple[Vector, Vector]:
-    force = turn @ force
-    return force, turn @ moment + offset.cross(force)
+def handed_down(offset: Vector, rotation: Matrix, force: Vector, moment: Vector) -> tuple[Vector, Vector]:
+    force = rotation @ force
+    return force, rotation @ moment + offset.cross(force)
 
 
 def turning(omega: Vector, omegad: Vector) -> Matrix:

@@ -34,11 +34,11 @@ class Momentum(NamedTuple):
     K: Matrix
     p: Vector
 
-    def force(self, turn: Vector) -> Screw:
-        return Screw(self.K @ turn, turn.cross(self.p * 2.0))
+    def force(self, angular: Vector) -> Screw:
+        return Screw(self.K @ angular, angular.cross(self.p * 2.0))
 
     def along(self, direction: Screw) -> Vector:
-        return self.K.transposed @ direction.turn + (self.p * 2.0).cross(direction.shift)
+        return self.K.transposed @ direction.angular + (self.p * 2.0).cross(direction.linear)
 
 
 def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
@@ -57,7 +57,7 @@ def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
     result: list[Screw] = []
     for i, joint in enumerate(tree.coordinates.joints):
         v = result[tree.parent[i]] if tree.parent[i] >= 0 else STILL
-        shift = sum((d.shift * rate for d, rate in zip(frames[i].directions, qd[joint.qd])), v.shift)
+        shift = sum((d.linear * rate for d, rate in zip(frames[i].directions, qd[joint.qd])), v.linear)
         result.append(Screw(frames[i].omega, shift))
     return result
 
@@ -76,7 +76,7 @@ def rates(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = 
         before, v0, a0 = tree.parent[i], STILL, Screw(ZERO, Vector(*tree.gravity) * -1.0)
         if before >= 0:  # of a point in space, not of one that moves with the frame
             v0 = v[before]
-            a0 = Screw(frames[before].omegad, frames[before].a - v0.turn.cross(v0.shift))
+            a0 = Screw(frames[before].omegad, frames[before].a - v0.angular.cross(v0.linear))
         for k in joint.speeds:
             Y.append(v0.times(S[k]))
             Z.append(combined(a0.times(S[k]), v0.times(Y[k])))
@@ -88,8 +88,8 @@ def rates(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = 
         for k in joints[i].speeds:
             by_turn = B[i].along(S[k])
             inertia = body.accelerated(S[k])  # I S, I being symmetric
-            moved = combined(body.accelerated(Z[k]), B[i].force(Y[k].turn))
-            sped = combined(body.accelerated(YW[k]), B[i].force(S[k].turn))
+            moved = combined(body.accelerated(Z[k]), B[i].force(Y[k].angular))
+            sped = combined(body.accelerated(YW[k]), B[i].force(S[k].angular))
             for other in joints[i].speeds:
                 by_movement[other][k] = moved.dot(S[other])
                 by_speed[other][k] = sped.dot(S[other])
@@ -99,6 +99,6 @@ def rates(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = 
             for other in path:
                 by_movement[other][k] = moved.dot(S[other])
                 by_speed[other][k] = sped.dot(S[other])
-                by_movement[k][other] = inertia.dot(Z[other]) + by_turn.dot(Y[other].turn)
-                by_speed[k][other] = inertia.dot(YW[other]) + by_turn.dot(S[other].turn)
+                by_movement[k][other] = inertia.dot(Z[other]) + by_turn.dot(Y[other].angular)
+                by_speed[k][other] = inertia.dot(YW[other]) + by_turn.dot(S[other].angular)
     return by_movement, by_speed

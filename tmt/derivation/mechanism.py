@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 from .coordinates import Coordinates, coordinates_of
-from .vectors import IDENTITY, Matrix, Scalar, Scalars, Vector, rotation, turn_of
+from .vectors import IDENTITY, Matrix, Scalar, Scalars, Vector, rotation, rotation_of
 
 Number = TypeVar("Number")
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -42,7 +42,7 @@ class Mechanism(Generic[Number]):
     site_names: Names = ()
     site_joint: Indices = ()
     site_offset: Rows[Number] = ()
-    site_turn: tuple[Rows[Number], ...] = ()
+    site_rotation: tuple[Rows[Number], ...] = ()
 
     @property
     def coordinates(self) -> Coordinates:
@@ -68,7 +68,7 @@ class Mechanism(Generic[Number]):
         """The site of that name, or the frame of the joint of that body; ValueError if there is neither."""
         if name in self.site_names:
             k = self.site_names.index(name)
-            return Site(self.site_joint[k], self.site_offset[k], self.site_turn[k])
+            return Site(self.site_joint[k], self.site_offset[k], self.site_rotation[k])
         if name not in self.body_names:
             known = dict.fromkeys([*self.site_names, *self.body_names])
             raise ValueError(f"there is no site or body {name!r}; the model has {', '.join(known)}")
@@ -89,7 +89,7 @@ class Mechanism(Generic[Number]):
 class Site(NamedTuple):
     joint: int
     offset: Sequence[Scalar]  # of its origin, in the frame of the joint, m
-    turn: Sequence[Sequence[Scalar]]  # its axes as columns, in the frame of the joint
+    rotation: Sequence[Sequence[Scalar]]  # its axes as columns, in the frame of the joint
 
 
 AnyTree = Mechanism[Scalar]
@@ -103,12 +103,12 @@ def origin_in_parent(tree: AnyTree, i: int, q: Scalars) -> Vector:
     return offset + Vector(*tree.axis[joint.qd.start]) * (q[joint.q.start] - tree.reference[i])
 
 
-def turn_in_parent(tree: AnyTree, i: int, q: Scalars) -> Matrix:
+def rotation_in_parent(tree: AnyTree, i: int, q: Scalars) -> Matrix:
     """Turn of joint i's frame in its parent's, which takes components in it to those in the parent's."""
     joint = tree.coordinates.joints[i]
     if joint.kind == "slide":
         return IDENTITY
     if joint.kind == "ball":
         axes = Matrix(tree.axis[joint.qd])
-        return axes.transposed @ turn_of(q[joint.q]) @ axes
+        return axes.transposed @ rotation_of(q[joint.q]) @ axes
     return rotation(tree.axis[joint.qd.start], q[joint.q.start] - tree.reference[i])

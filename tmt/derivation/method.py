@@ -25,7 +25,7 @@ from itertools import combinations
 from typing import NamedTuple
 
 from .dual import jacobian
-from .mechanism import AnyTree, origin_in_parent, turn_in_parent
+from .mechanism import AnyTree, origin_in_parent, rotation_in_parent
 from .vectors import (
     IDENTITY,
     ZERO,
@@ -49,7 +49,7 @@ Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 
 class Frame(NamedTuple):
     origin: Vector  # m
-    turn: Matrix  # body axes -> inertial axes
+    rotation: Matrix  # body axes -> inertial axes
     axes: list[Vector]  # of its speeds, inertial axes
     slides: bool  # along its axis; else it turns about its axes
     omega: Vector  # rad/s
@@ -98,25 +98,25 @@ def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scal
         origin, origin_conv = carried(parent, origin_in_parent(tree, i, q))
         axes = [Vector(*axis) for axis in tree.axis[joint.qd]]
         if joint.kind == "slide":
-            axis = parent.turn @ axes[0]
+            axis = parent.rotation @ axes[0]
             origin_conv = origin_conv + parent.omega.cross(axis * (qd[joint.qd.start] * 2.0))  # Coriolis
             origin_conv = origin_conv + axis * qdd[joint.qd.start] if qdd else origin_conv
             moved = parent._replace(origin=origin, axes=[axis], slides=True, origin_conv=origin_conv)
             frames.append(moved)
             continue
-        turn = parent.turn @ turn_in_parent(tree, i, q)
-        carrier = turn if joint.kind == "ball" else parent.turn  # the axes of a ball turn with it
+        rotation = parent.rotation @ rotation_in_parent(tree, i, q)
+        carrier = rotation if joint.kind == "ball" else parent.rotation  # the axes of a ball turn with it
         axes = [carrier @ axis for axis in axes]
         spin = total_vector(axis * rate for axis, rate in zip(axes, qd[joint.qd]))
         omega, omega_conv = parent.omega + spin, parent.omega_conv + parent.omega.cross(spin)
         omega_conv = sum((axis * rate for axis, rate in zip(axes, qdd[joint.qd])), omega_conv)
-        frames.append(Frame(origin, turn, axes, False, omega, origin_conv, omega_conv))
+        frames.append(Frame(origin, rotation, axes, False, omega, origin_conv, omega_conv))
     return frames
 
 
 def carried(frame: Frame, point: Vector) -> tuple[Vector, Vector]:
     """Position and acceleration at qdd = 0 of a point fixed in a frame, given in its axes (m)."""
-    r = frame.turn @ point
+    r = frame.rotation @ point
     turning = frame.omega_conv.cross(r) + frame.omega.cross(frame.omega.cross(r))
     return frame.origin + r, frame.origin_conv + turning
 
@@ -132,11 +132,11 @@ def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = 
     for b, joint in enumerate(tree.body_joint):
         frame = frames[joint] if joint >= 0 else WORLD
         x, v_conv = carried(frame, Vector(*tree.com[b]))
-        to_body = frame.turn.transposed
+        to_body = frame.rotation.transposed
         T, B = map(list, zip(*columns(tree, frames, joint, x, to_body)))
         omega, w_conv = to_body @ frame.omega, to_body @ frame.omega_conv
         inertia = Matrix(tree.inertia[b])
-        result.append(Body(x, T, B, omega, v_conv, w_conv, tree.mass[b], inertia, frame.turn))
+        result.append(Body(x, T, B, omega, v_conv, w_conv, tree.mass[b], inertia, frame.rotation))
     return result
 
 
@@ -155,10 +155,10 @@ def placed_frame(tree: AnyTree, name: str, q: Scalars, qd: Scalars | None = None
     frames, site = joint_frames(tree, q, qd), tree.site_of(name)
     carrier = frames[site.joint] if site.joint >= 0 else WORLD
     x, x_conv = carried(carrier, Vector(*site.offset))
-    turn = carrier.turn @ Matrix(site.turn)
+    rotation = carrier.rotation @ Matrix(site.rotation)
     moving = columns(tree, frames, site.joint, x, IDENTITY)
     jacobian = [list(row) for row in zip(*([*linear, *angular] for linear, angular in moving))]
-    pose = [[*row, component] for row, component in zip(turn, x)]
+    pose = [[*row, component] for row, component in zip(rotation, x)]
     return Placed(pose, jacobian, [*x_conv, *carrier.omega_conv])
 
 
@@ -263,7 +263,7 @@ def regressor(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Rows:
     Y: Rows = [[] for _ in tree.axis]
     for joint in tree.body_joint:
         frame = frames[joint] if joint >= 0 else WORLD
-        to_body = frame.turn.transposed
+        to_body = frame.rotation.transposed
         omega, omegad = to_body @ frame.omega, to_body @ frame.omega_conv
         a = to_body @ (frame.origin_conv - Vector(*tree.gravity))
         forces = [a, *(omegad.cross(u) + omega.cross(omega.cross(u)) for u in units)]

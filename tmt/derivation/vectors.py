@@ -117,7 +117,7 @@ def rotation(axis: Iterable[Scalar], angle: Scalar) -> Matrix:
     return Matrix([first, second, third])
 
 
-def turn_of(quaternion: Iterable[Scalar]) -> Matrix:
+def rotation_of(quaternion: Iterable[Scalar]) -> Matrix:
     """Matrix that turns as a quaternion p = (w, v) of any length: R = 1 + 2 (w [v]x + [v]x [v]x) / p.p."""
     w, x, y, z = quaternion
     scale = 2.0 / (w * w + x * x + y * y + z * z)

@@ -42,7 +42,7 @@ class Parameters:
         self.meanings: dict[str, str] = {}
         self.places: dict[str, tuple[str, int]] = {}  # part and body of an argument
         carrier, sites = dict(zip(tree.body_names, tree.body_joint)), zip(tree.site_names, tree.site_joint)
-        axes = zip(tree.site_offset, tree.site_turn)
+        axes = zip(tree.site_offset, tree.site_rotation)
         # a site of a body's name on another joint is no frame of the body
         self.sites = {name: own for (name, joint), own in zip(sites, axes) if carrier.get(name) == joint}
         self.carriers, self.key = list(range(len(tree.mass))), (tree, *words)
@@ -116,11 +116,11 @@ class Parameters:
 
 
 def placed(part: str, values: Values, frame: Frame) -> Any:
-    turn = Matrix(np.where(np.abs(frame.axes) < 1e-15, 0.0, frame.axes).tolist())
+    rotation = Matrix(np.where(np.abs(frame.axes) < 1e-15, 0.0, frame.axes).tolist())
     if part == "mass":
         return values[0]
     if part == "com":
-        return tuple(Vector(*frame.origin.tolist()) + turn @ Vector(*values))
+        return tuple(Vector(*frame.origin.tolist()) + rotation @ Vector(*values))
     xx, yy, zz, xy, xz, yz = values
-    tensor = turn @ Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.transposed
+    tensor = rotation @ Matrix([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.transposed
     return tuple(map(tuple, tensor))

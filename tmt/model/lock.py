@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from tmt.derivation.mechanism import Mechanism, origin_in_parent, turn_in_parent
+from tmt.derivation.mechanism import Mechanism, origin_in_parent, rotation_in_parent
 from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector
 
 from .values import CLOSE_TO_ONE as CLOSE_TO_ONE
@@ -22,13 +22,13 @@ class Carrier(NamedTuple):
 
     joint: int
     origin: Vector
-    turn: Matrix
+    rotation: Matrix
 
     def point(self, point: Sequence[float]) -> tuple[float, float, float]:
         """A point of the frame, in the axes and from the origin of the free joint's."""
         turned = Vector(*point)
-        if self.turn is not IDENTITY:
-            turned = self.turn @ turned
+        if self.rotation is not IDENTITY:
+            turned = self.rotation @ turned
         x, y, z = self.origin + turned
         return x, y, z
 
@@ -36,16 +36,16 @@ class Carrier(NamedTuple):
         return self._replace(origin=ZERO).point(direction)
 
     def tensor(self, tensor: Sequence[Sequence[float]]) -> Any:
-        if self.turn is IDENTITY:
+        if self.rotation is IDENTITY:
             return tensor
-        turned = np.array([list(row) for row in self.turn @ Matrix(tensor) @ self.turn.transposed])
+        turned = np.array([list(row) for row in self.rotation @ Matrix(tensor) @ self.rotation.transposed])
         return (turned + turned.T) / 2.0
 
     def turned(self, axes: Sequence[Sequence[float]]) -> Any:
-        return tuple(tuple(row) for row in self.turn @ Matrix(axes))
+        return tuple(tuple(row) for row in self.rotation @ Matrix(axes))
 
-    def onward(self, origin: Vector, turn: Matrix) -> Carrier:
-        turned = self.turn if turn is IDENTITY else self.turn @ turn
+    def onward(self, origin: Vector, rotation: Matrix) -> Carrier:
+        turned = self.rotation if rotation is IDENTITY else self.rotation @ rotation
         return Carrier(self.joint, Vector(*self.point(tuple(origin))), turned)
 
 
@@ -77,7 +77,7 @@ def locked(tree: Mechanism[float], angles: Mapping[str, Any]) -> dict[str, Any]:
     for i in range(len(names)):
         before.append(frames[tree.parent[i]] if tree.parent[i] >= 0 else WORLD)
         if i in free:
-            frames.append(Carrier(free.index(i), ZERO, before[i].turn))
+            frames.append(Carrier(free.index(i), ZERO, before[i].rotation))
         else:
             frames.append(before[i].onward(*_fixed(tree, i, q)))
     carried = [frames[joint] if joint >= 0 else WORLD for joint in tree.body_joint]
@@ -98,7 +98,9 @@ def locked(tree: Mechanism[float], angles: Mapping[str, Any]) -> dict[str, Any]:
         "rest": tuple(value for i in free for value in tree.rest[joints[i].q]),
         "site_joint": tuple(carrier.joint for carrier in of_sites),
         "site_offset": tuple(carrier.point(offset) for carrier, offset in zip(of_sites, tree.site_offset)),
-        "site_turn": tuple(carrier.turned(turn) for carrier, turn in zip(of_sites, tree.site_turn)),
+        "site_rotation": tuple(
+            carrier.turned(rotation) for carrier, rotation in zip(of_sites, tree.site_rotation)
+        ),
     }
 
 
@@ -122,7 +124,7 @@ def _refuse_fed_back(tree: Mechanism[float], locked_names: Any, q: Sequence[floa
 def _fixed(tree: Mechanism[float], i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
     joint = tree.coordinates.joints[i]
     if any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]:
-        return origin_in_parent(tree, i, q), turn_in_parent(tree, i, q)
+        return origin_in_parent(tree, i, q), rotation_in_parent(tree, i, q)
     return Vector(*tree.offset[i]), IDENTITY
 
 

@@ -20,8 +20,8 @@ from .lock import locked
 from .values import names, numbers_of, shown
 
 # fields that may be left out
-OPTIONAL = ("reference", "armature", "stiffness", "rest", "site_offset", "site_turn")
-ABSENT = {"site_turn": np.eye(3)}  # what stands for them, where it is not zero
+OPTIONAL = ("reference", "armature", "stiffness", "rest", "site_offset", "site_rotation")
+ABSENT = {"site_rotation": np.eye(3)}  # what stands for them, where it is not zero
 GAINS = ("position_gain", "speed_gain")  # and those of a controller, which are () where there is none
 NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stiffness": "N m/rad"}
 NAMES_SHOWN = 60  # characters
@@ -64,7 +64,7 @@ class Tree(Mechanism[float]):
     site_names : (k,) of further frames for `frame`, each fixed to that of a joint
     site_joint : (k,) index of that joint; -1: fixed to the world
     site_offset : (k, 3), m, from the origin of the joint's frame to the site's, in the frame of the joint
-    site_turn : (k, 3, 3) the axes of the site as columns, in the frame of the joint; (): parallel to it
+    site_rotation : (k, 3, 3) the axes of the site as columns, in the frame of the joint; (): parallel to it
 
     Examples
     --------
@@ -87,7 +87,7 @@ class Tree(Mechanism[float]):
             com: ArrayLike, inertia: ArrayLike, gravity: ArrayLike, kind: Sequence[str] = (),
             armature: ArrayLike = (), stiffness: ArrayLike = (), rest: ArrayLike = (), reference: ArrayLike = (),
             position_gain: ArrayLike = (), speed_gain: ArrayLike = (), site_names: Sequence[str] = (),
-            site_joint: ArrayLike = (), site_offset: ArrayLike = (), site_turn: ArrayLike = (),
+            site_joint: ArrayLike = (), site_offset: ArrayLike = (), site_rotation: ArrayLike = (),
         ) -> None: ...  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -100,7 +100,7 @@ class Tree(Mechanism[float]):
             "parent": (n,), "offset": (n, 3), "axis": (nv, 3), "damping": (nv,),
             "body_joint": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
             "reference": (n,), "armature": (nv,), "stiffness": (n,), "rest": (nq,),
-            "site_joint": (k,), "site_offset": (k, 3), "site_turn": (k, 3, 3),
+            "site_joint": (k,), "site_offset": (k, 3), "site_rotation": (k, 3, 3),
         }  # fmt: skip
         for name, shape in shapes.items():
             value = getattr(self, name)
@@ -114,8 +114,8 @@ class Tree(Mechanism[float]):
         self._set("parent", checks.indices("parent", self.parent, range(n)))
         self._set("body_joint", checks.indices("body_joint", self.body_joint, [n] * m))
         self._set("site_joint", checks.indices("site_joint", self.site_joint, [n] * k))
-        for name, turn in zip(self.site_names, self.site_turn):
-            checks.check_axes(f"Tree.site_turn of {name!r}", np.array(turn).T)
+        for name, rotation in zip(self.site_names, self.site_rotation):
+            checks.check_axes(f"Tree.site_rotation of {name!r}", np.array(rotation).T)
         self._set("axis", tuple(checks.direction(i, axis) for i, axis in enumerate(self.axis)))
         for name, unit in NOT_NEGATIVE.items():
             if min(getattr(self, name)) < 0.0:

@@ -16,7 +16,7 @@ from numpy import ndarray
 
 import tmt
 from tmt import literal
-from tmt.derivation.mechanism import turn_in_parent
+from tmt.derivation.mechanism import rotation_in_parent
 from tmt.derivation.vectors import Matrix
 
 from ...core.cause import Cause
@@ -239,7 +239,7 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
         for (of_q, own_q), in_world, in_body in ways:
             said = {f"quaternion of {name}": of_q, f"angular velocity of {name}": "in world axes" * in_world}
             said[f"linear velocity of {slides}"] = "in body axes" * in_body
-            R = matrices(turn_in_parent(tree, i, list(own_q.T)), len(q))
+            R = matrices(rotation_in_parent(tree, i, list(own_q.T)), len(q))
             S, drift = np.tile(np.eye(equations.nv), (len(q), 1, 1)), 0.0 * qd
             if in_world:
                 S[:, joint.qd, joint.qd] = np.swapaxes(R, 1, 2)

@@ -88,7 +88,9 @@ class Kinematics:
             frames, rows = method.joint_frames(self.tree, list(q.T)), len(q)
             axes = vectors([[axis for frame in frames for axis in frame.axes]], rows)[0]
             origins = vectors([[frame.origin for frame in frames]], rows)[0]
-            turns = np.array([[[np.broadcast_to(x, rows) for x in row] for row in f.turn] for f in frames])
+            turns = np.array(
+                [[[np.broadcast_to(x, rows) for x in row] for row in f.rotation] for f in frames]
+            )
             self.motions[joint, other] = Motion(axes, origins, np.moveaxis(turns, 3, 1))
         return self.motions[joint, other]
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy import ndarray
 
 import tmt
-from tmt.derivation.mechanism import origin_in_parent, turn_in_parent
+from tmt.derivation.mechanism import origin_in_parent, rotation_in_parent
 
 from ..hypothesis import Hypothesis, slip
 from ..model import Equations
@@ -126,7 +126,7 @@ class Recursion:
             a = parent.a + self.carried(i, arm, parent.omega, parent.alpha) + axis * forced
             a = a + 2.0 * np.cross(parent.omega, axis * rates)
             return parent._replace(own=self.identity, arm=arm, axes=[axis], a=a, slides=True)
-        own = matrices(turn_in_parent(self.tree, i, columns), self.rows)
+        own = matrices(rotation_in_parent(self.tree, i, columns), self.rows)
         turn = parent.turn @ step("transposed", i, own, lambda: backward(own))
         turn = step("order", i, turn, lambda: own @ parent.turn)
         turn = step("absolute", i, turn, lambda: own)

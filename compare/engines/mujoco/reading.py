@@ -154,7 +154,7 @@ def tree_with_sites(reading: Reading) -> tmt.Tree:
         "site_names": names,
         "site_joint": joints,
         "site_offset": [position - origins[joint] for position, joint in zip(positions, joints)],
-        "site_turn": [turn.reshape(3, 3) for turn in turns],
+        "site_rotation": [turn.reshape(3, 3) for turn in turns],
     }
     return replace(reading.tree, **sites)
 

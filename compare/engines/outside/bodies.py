@@ -71,7 +71,7 @@ def links_of(tree: tmt.Tree, q: Array) -> list[Link]:
     frames, links = joint_frames(tree, q.tolist()), []
     for number, joint in enumerate(tree.body_joint):
         if joint >= 0:
-            turn = np.array([[*row] for row in frames[joint].turn])
+            turn = np.array([[*row] for row in frames[joint].rotation])
             body = Body(tree.mass[number], np.array(tree.com[number]), np.array(tree.inertia[number]))
             links.append(Link(number, joint, turn, np.array([*frames[joint].origin]), body))
     return links
