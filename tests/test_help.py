@@ -85,7 +85,7 @@ def test_a_command_line_that_is_shown_can_be_given(line, capsys):
         assert request(words)[0] == words[0]
 
 
-FILES_OF_ARM = ["my_arm.xml", "my_robot.xml", "solution.xml", "robot.urdf"]
+FILES_OF_ARM = ["my_arm.xml", "my_robot.xml", "solution.xml"]
 FILES_OF_ARM += ["models/a.xml", "class/a.xml", "submissions/a.xml"]
 IN_SECONDS = "equations --out arm_c", "mass --out /tmp/mass", "parameters --mjcf my_arm.xml --reference arm"
 
@@ -116,6 +116,7 @@ def test_a_command_line_that_is_shown_runs(inside, line, tmp_path, monkeypatch, 
     mine, arm = (path.read_text(encoding="utf-8") for path in (Path("mine.py"), ARM.mjcf))
     files = dict.fromkeys(FILES_OF_ARM, arm) | {"submissions/b.xml": arm.replace('mass="1.5"', 'mass="1.6"')}
     files |= {"robot.xml": own_equations.XML.replace("</mujoco>", servo), "my_equations.py": mine + POSITIONS}
+    files["robot.urdf"] = own_equations.XML
     files |= {"release.txt": "models/a.xml\n", "recorded.csv": "time,hip\n0,0\n0.5,0.1\n1,0\n"}
     for name, text in (files | {"my.toml": blocks("toml")[0]}).items():
         Path(name).parent.mkdir(exist_ok=True)

@@ -3,12 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
+from crane import crane
 from many_digits import distance, exact
 from models import PATHS
 from trees import random_states, small_tree, tree_of_kinds
 
 import compare
 import tmt
+from compare.engines.mujoco import parse
 from compare.judge.scale import EPS
 from tmt.derivation.quantities import QUANTITIES
 
@@ -32,6 +34,14 @@ def test_they_are_those_of_mujoco(name, rng):
     assert np.abs(tmt.com_jacobian(tree, q) - jacobian).max() < 1e-13
     momentum = tmt.centroidal_momentum_matrix(tree, q)
     assert np.abs(momentum - np.concatenate([mass * jacobian, angular])).max() < 1e-13 * max(1.0, mass)
+
+
+def test_bodies_that_never_move_count_where_the_tree_has_them(tmp_path, rng):
+    robot = crane(tmp_path)  # with a foot of 4 kg on the world
+    mujoco_of_it, q = parse(robot.mjcf, robot.tree).of(robot.case()), rng.uniform(-1.0, 1.0, (3, 4))
+    for name in ("com", "com_jacobian", "centroidal_momentum_matrix"):
+        assert np.abs(getattr(tmt, name)(robot.tree, q) - getattr(mujoco_of_it, name)(q)).max() < 1e-14
+    assert np.abs(tmt.com(robot.tree, q)[:, 1]).min() > 0.01
 
 
 @pytest.mark.parametrize("tree", TREES.values(), ids=TREES)

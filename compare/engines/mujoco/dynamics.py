@@ -50,7 +50,7 @@ class MujocoDynamics(Runs):
         super().__init__(model, case)
         self.bodies, self.bare = list(bodies), bare
         self.forward(np.array(case.tree.zero))
-        self.whole = Whole(model)
+        self.whole = Whole(model, self.bodies)
         self.zero_axes = self.turns(self.data.xmat)
 
     def com_positions(self, q: Array) -> np.ndarray:

@@ -1,6 +1,6 @@
-"""Centre of mass and momentum of all that moves, from MuJoCo's subtrees of the bodies that joints hang on the world."""
+"""Centre of mass and momentum of a robot, from MuJoCo's subtrees of the bodies that joints hang on the world."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -9,19 +9,23 @@ Jacobian = Callable[[mujoco.MjModel, mujoco.MjData, np.ndarray, int], None]
 
 
 class Whole:
-    """Its methods take data of which mj_comPos is done. What never moves does not count."""
+    """Its methods take data of which mj_comPos is done.
 
-    def __init__(self, model: mujoco.MjModel) -> None:
-        self.model, moves = (
-            model,
-            model.body_treeid >= 0,
-        )  # no tree: the world, mocap bodies, what is fixed to them
+    bodies: those of the robot; of what never moves these alone count.
+    """
+
+    def __init__(self, model: mujoco.MjModel, bodies: Sequence[int]) -> None:
+        # in no tree: the world, mocap bodies, and what is fixed to them
+        self.model, moves = model, model.body_treeid >= 0
         self.trees = np.flatnonzero(moves & ~moves[model.body_parentid])
         self.masses = model.body_subtreemass[self.trees]
-        self.shares = self.masses / self.masses.sum()
+        self.still = [body for body in bodies if not moves[body]]
+        self.total = self.masses.sum() + model.body_mass[self.still].sum()
+        self.shares = self.masses / self.total
 
     def com(self, d: mujoco.MjData) -> np.ndarray:
-        return self.shares @ d.subtree_com[self.trees]
+        at_rest = self.model.body_mass[self.still] @ d.xipos[self.still] / self.total
+        return self.shares @ d.subtree_com[self.trees] + at_rest
 
     def com_jacobian(self, d: mujoco.MjData) -> np.ndarray:
         """(3, nv)."""
