@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.text import block, say
-from .comparison import Comparison, State
+from .comparison import Comparison
+from .records import State
 from .tree import tree
 from .why import Why, cause_of
 

@@ -6,11 +6,10 @@ from functools import cached_property
 from itertools import product
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
-from tmt import literal
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import shown
 
@@ -18,67 +17,23 @@ from ..core.text import say
 from ..core.words import capital
 from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations, OwnError
 from ..engines.own.functions import (
-    Quantity,
     converted,
     in_shape,
     in_words,
     is_function,
     numbers_of,
-    state_in_words,
 )
-from ..judge.agree import over, share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
 from ..robots.joint_map import joint_map
 from ..robots.scene import is_number
 from ..robots.states import random
+from .coriolis import OF_CORIOLIS, parts, right_parts, scales_of_parts
+from .records import COMPARED, SYMBOLS, Compared, State
 
-# what is compared of a Coriolis matrix, which Mbar and h do not determine: its product, and its symmetric part
-OF_CORIOLIS = {"C qd": Quantity(2, ("nv",)), "C + C'": Quantity(2, ("nv", "nv"))}
-COMPARED = QUANTITIES | OF_CORIOLIS
-# of entries of quantities
-SYMBOLS = {"mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd"}
-SYMBOLS |= {"coriolis_matrix": "C", "C qd": "(C qd)", "C + C'": "(C + C')"}
 DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
-
-
-class State(NamedTuple):
-    """A state in the user's joints."""
-
-    number: int
-    q: tuple[float, ...]
-    qd: tuple[float, ...]
-    tau: tuple[float, ...]
-
-    def said(self, quantity: str) -> str:
-        """What of the state a quantity depends on, as it can be typed."""
-        return state_in_words((self.q, self.qd, self.tau)[: COMPARED[quantity].arguments])
-
-
-class Compared(NamedTuple):
-    """One quantity at all states, (states, ...), in the user's joints."""
-
-    yours: np.ndarray
-    right: np.ndarray  # MuJoCo's
-    rounding: np.ndarray  # 64 eps x scale
-    tolerance: np.ndarray  # with rtol
-
-    @property
-    def ratio(self) -> np.ndarray:
-        """Of the difference to the tolerance; 0 if both are 0, inf if the user's value is not finite."""
-        return share_of(np.abs(self.yours - self.right), self.tolerance)
-
-    @property
-    def fails(self) -> bool:
-        return bool((self.ratio > 1.0).any())
-
-    @property
-    def least_rtol(self) -> float:
-        """The rtol with which all entries agree; NaN or inf where none does."""
-        beyond = np.maximum(np.abs(self.yours - self.right) - self.rounding, 0.0)
-        return float(over(beyond, np.broadcast_to(np.abs(self.right).max(axis=0), beyond.shape)).max())
 
 
 def origin_of(mjcf: Any) -> Any:
@@ -193,22 +148,16 @@ class Comparison:
         for name, brought in self.brought.items():
             is_table = equations is None or not equations.has(name)
             values[name] = self.table(name, brought) if is_table else self.asked(equations, name)
-        if (C := values.pop("coriolis_matrix", None)) is not None:
-            self.coriolis = C
-            values["C qd"] = np.einsum("sij,sj->si", C, self.qd)
-            values["C + C'"] = C + C.swapaxes(1, 2)
+        if "coriolis_matrix" in values:
+            self.coriolis = values.pop("coriolis_matrix")
+            values |= parts(self.coriolis, self.qd)
         self.problems = [problem.text for problem in equations.problems] if equations is not None else []
         return values
 
     def asked(
         self, source: object, name: str, q: np.ndarray | None = None, qd: np.ndarray | None = None
     ) -> np.ndarray:
-        """A quantity of an engine at the states, or at others; of a Coriolis matrix MuJoCo's bias, and dMbar/dt."""
-        if name == "C qd":
-            return self.mujoco.bias(self.q, self.qd) - self.mujoco.gravity_balance(self.q)
-        if name == "C + C'":
-            C = literal.coriolis_matrix(self.tree, self.q, self.qd)
-            return C + C.swapaxes(1, 2)
+        """A quantity of an engine at the states, or at others."""
         state = self.q if q is None else q, self.qd if qd is None else qd, self.tau
         return np.asarray(getattr(source, METHOD_NAMES[name])(*state[: QUANTITIES[name].arguments]))
 
@@ -226,7 +175,9 @@ class Comparison:
     @cached_property
     def right(self) -> dict[str, np.ndarray]:
         """MuJoCo's values of each quantity, in the model's joints."""
-        return {name: self.asked(self.mujoco, name) for name in self.values}
+        plain = {name: self.asked(self.mujoco, name) for name in self.values if name not in OF_CORIOLIS}
+        has_coriolis = OF_CORIOLIS.keys() <= self.values.keys()
+        return plain | (right_parts(self.mujoco, self.tree, self.q, self.qd) if has_coriolis else {})
 
     @cached_property
     def roundings(self) -> dict[str, np.ndarray]:
@@ -269,8 +220,7 @@ class Comparison:
             text = "Mbar of the model is singular at a state: there is no acceleration to compare"
             raise ValueError(text) from None
         if name in OF_CORIOLIS:
-            C = scale.coriolis_matrix
-            return 2.0 * C if name == "C + C'" else np.einsum("sij,sj->si", C, np.abs(self.qd)) + scale.weight
+            return scales_of_parts(scale)[name]
         return {"mass_matrix": scale.mass_matrix, "bias": scale.bias, "gravity": scale.weight}[name]
 
     def entries(self, name: str) -> dict[tuple[int, ...], str]:

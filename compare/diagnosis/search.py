@@ -29,7 +29,7 @@ from .model import Equations
 from .pairs import of_numbers, of_slips
 from .regression import several
 
-# states at which hypotheses are tried first: at least so many, and values for those of two numbers
+# states at which hypotheses are tried first: at least this number, and values for those of two numbers
 FEW, ENOUGH = 3, 40
 LARGE = 7e7  # times the tolerance of 64 eps: 1e-6 of the scale
 NEAREST = 0.05  # of the difference: what leaves more is not near

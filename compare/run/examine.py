@@ -281,9 +281,8 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
         is_one = is_explained and found.why.diagnosis.causes[0].rank < 3
         return ([found.said[0], *others], 0) if is_one else (numbers, 0)
     searched = [cause for cause in found.said if cause.place not in {each.place for each in numbers}]
-    is_known = is_explained and not (
-        setup.own and setup.own.equations.problems
-    )  # what is not finite stays so
+    has_problems = bool(setup.own and setup.own.equations.problems)  # what is not finite stays so
+    is_known = is_explained and not has_problems
     return searched + numbers, found.states * is_known
 
 

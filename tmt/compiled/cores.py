@@ -17,7 +17,7 @@ def in_threads(
     work: Callable[[slice], Result], count: int, parts: int, block: int, threads: int,
     stop: Callable[[], None] | None = None,
 ) -> list[Result]:  # fmt: skip
-    """work(slice) of parts of a number of states, cut at multiples of a block, in so many threads.
+    """work(slice) of parts of a number of states, cut at multiples of a block, in a number of threads.
 
     stop: ends the work where it is interrupted (Ctrl-C, which no compiled code sees); then it has a thread of
     its own.

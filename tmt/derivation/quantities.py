@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from . import method
+from . import method, whole
 from .dual import jacobian, unit_vectors
 from .mechanism import AnyTree
 from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values, added
@@ -122,7 +122,7 @@ class State:
             rates = method.bias_rates(self.tree, self.q, self.qd, self.form.terms)
         else:
             rates = self.form.rates(self.tree, self.q, self.qd, nothing)[1]
-        return method.coriolis_matrix(self.tree, self.qd, self.mass_matrix, rates)
+        return whole.coriolis_matrix(self.tree, self.qd, self.mass_matrix, rates)
 
     @property
     def potential_energy(self) -> Scalar:
@@ -200,15 +200,15 @@ QUANTITIES = {
     "coriolis_matrix": Quantity(
         QD, ("nv", "nv"), "N m s/rad", lambda s: s.coriolis_matrix, is_long=True
     ),
-    "com": Quantity(Q, (3,), "m", lambda s: list(method.centre_of_mass(s.bodies)[0]), has_forms=False),
+    "com": Quantity(Q, (3,), "m", lambda s: list(whole.centre_of_mass(s.bodies)[0]), has_forms=False),
     "com_jacobian": Quantity(
-        Q, (3, "nv"), "m/rad", lambda s: method.centre_of_mass(s.bodies)[1], has_forms=False
+        Q, (3, "nv"), "m/rad", lambda s: whole.centre_of_mass(s.bodies)[1], has_forms=False
     ),
     "centroidal_momentum_matrix": Quantity(
-        Q, (6, "nv"), "kg m/rad; kg m2/rad", lambda s: method.centroidal_momentum(s.bodies), has_forms=False
+        Q, (6, "nv"), "kg m/rad; kg m2/rad", lambda s: whole.centroidal_momentum(s.bodies), has_forms=False
     ),
     "regressor": Quantity(
-        QDD, ("nv", "10m"), "SI", lambda s: method.regressor(s.tree, s.q, s.qd, s.qdd), is_long=True, has_forms=False
+        QDD, ("nv", "10m"), "SI", lambda s: whole.regressor(s.tree, s.q, s.qd, s.qdd), is_long=True, has_forms=False
     ),
     "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy, has_forms=False),
     "energy": Quantity(QD, (), "J", lambda s: s.energy, has_forms=False),

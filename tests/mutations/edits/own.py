@@ -86,7 +86,7 @@ EDITS = (
     ("agreement.tables", "decimals", "WHOLE + _1", "0.4 + _1", "any numbers are rounded"),
     ("agreement.tables", "slips_of_tables", "len(comparison.q) < LEAST_ROWS or _1", "_1", "two rows are a table"),
     ("agreement.why", "of_inputs", "left_over.ratio <= 1.0 or _1", "True", "a force beside a gear is hidden"),
-    ("agreement.comparison", "Comparison.scale", "scale.weight", "scale.bias", "gravity has the scale of the bias", 2),
+    ("agreement.comparison", "Comparison.scale", "scale.weight", "scale.bias", "gravity has the scale of the bias"),
     ("agreement", "rows", "cause if ratio > 1.0 else ''", "cause", "an entry that agrees has a cause"),
     ("agreement.comparison", "Comparison.take_states", "self.joints.forces(_1)", "_1", "torques keep their joints"),
     ("agreement.comparison", "Comparison.take_random", "equations.try_at(*_1)", "None", "functions are not tried"),
