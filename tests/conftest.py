@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from filelock import FileLock
+from helpers.in_process import of_arm, without_workers
 from hypothesis import settings
-from in_process import of_arm, without_workers
 
 from compare.engines.mujoco import parse
 from compare.robots.arm import ARM
@@ -28,8 +28,8 @@ settings.register_profile("project", database=None, derandomize=True, deadline=N
 settings.load_profile("project")
 
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
-    "tests": 55, "diagnosis": 32, "engines": 12, "experiments": 56, "export": 10, "fleet": 8, "judge": 2, "process": 20,
-    "report": 12, "stability": 26, "tmt": 44, "truth": 2,
+    "agreement": 16, "diagnosis": 32, "engines": 12, "experiments": 50, "export": 12, "fleet": 8, "house": 14, "judge": 2,
+    "process": 20, "report": 12, "robots": 10, "run": 20, "stability": 30, "tmt": 40, "truth": 2,
 }  # fmt: skip
 LONGEST = 10  # tests that are listed
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import faults
 import numpy as np
 import pytest
-from trees import one_body
+from helpers.trees import one_body
 
 import tmt
 from compare.diagnosis import Values, diagnose

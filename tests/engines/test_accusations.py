@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from files import STL
+from helpers.files import STL
 
 import tmt
 from compare.engines import RECORDS

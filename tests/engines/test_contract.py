@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from crane import TREE, XML
-from files import assert_the_same
+from helpers.crane import TREE, XML
+from helpers.files import assert_the_same
 
 import tmt
 from compare.engines import GRID, Setting

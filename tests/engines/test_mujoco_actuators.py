@@ -3,8 +3,8 @@
 import mujoco
 import numpy as np
 import pytest
-from edited import setup_of_file
-from files import TENDON, TWO, mjcf
+from helpers.edited import setup_of_file
+from helpers.files import TENDON, TWO, mjcf
 from models import PATHS
 
 import tmt

@@ -3,7 +3,7 @@
 import mujoco as plain
 import numpy as np
 import pytest
-from crane import crane
+from helpers.crane import crane
 
 import tmt
 from compare.engines import GRID, Setting

@@ -6,11 +6,11 @@ import pickle
 import mujoco
 import numpy as np
 import pytest
-from crane import TREE
-from crane import XML as CRANE
-from edited import XML, edited
-from files import PLAIN, TENDON, TWO, mjcf
-from runs import posix
+from helpers.crane import TREE
+from helpers.crane import XML as CRANE
+from helpers.edited import XML, edited
+from helpers.files import PLAIN, TENDON, TWO, mjcf
+from helpers.runs import posix
 
 import compare
 from compare.core.text import say

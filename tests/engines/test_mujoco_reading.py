@@ -5,11 +5,11 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from files import PLAIN, TENDON, TWO, URDF, assert_the_same, case_of, mjcf
+from helpers.files import PLAIN, TENDON, TWO, URDF, assert_the_same, case_of, mjcf
+from helpers.trees import random_state
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from models import KINDS, PATHS, gymnasium_files, random_tree, with_features
-from trees import random_state
 
 import tmt
 from compare.engines.mujoco import ModelError, Source, engine, read

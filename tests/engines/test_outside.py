@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from files import assert_exact
+from helpers.files import assert_exact
 
 import tmt
 from compare.engines import RECORDS, Setting

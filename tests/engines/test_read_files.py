@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from files import assert_exact
+from helpers.files import assert_exact
 
 import tmt
 from compare.engines import Setting

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from edited import setup_of_file
+from helpers.edited import setup_of_file
 from models import PATHS
 from scipy.integrate import solve_ivp
 

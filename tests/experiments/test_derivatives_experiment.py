@@ -5,8 +5,8 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 import pytest
-from edited import XML, edited, setup_between, setup_of, setup_of_file
-from servo_models import hinge
+from helpers.edited import XML, edited, setup_between, setup_of, setup_of_file
+from helpers.servo_models import hinge
 
 import tmt
 from compare.core.text import say, screen

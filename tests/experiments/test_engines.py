@@ -12,8 +12,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edited import setup_of
-from trees import tree_of_kinds
+from helpers.edited import setup_of
+from helpers.trees import tree_of_kinds
 
 from compare import engines, experiments
 from compare.core.check import About

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from edited import CART, MOON, STONE, setup_between, setup_of
-from judged import BOTH, verdicts
+from helpers.edited import CART, MOON, STONE, setup_between, setup_of
+from helpers.judged import BOTH, verdicts
 from models import random_tree
 
 import tmt

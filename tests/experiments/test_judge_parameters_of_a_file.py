@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from edited import XML, setup_of, setup_of_file
+from helpers.edited import XML, setup_of, setup_of_file
 from models import PATHS
 
 from compare.core.check import Result

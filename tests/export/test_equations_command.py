@@ -9,7 +9,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from in_process import answered
+from helpers.in_process import answered
 from models import PATHS
 
 import compare

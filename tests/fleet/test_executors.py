@@ -9,9 +9,8 @@ from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
-import runs
-import toy
-from toy import soon
+from helpers import runs, toy
+from helpers.toy import soon
 
 from compare.core.errors import Refused
 from compare.fleet import executors as module

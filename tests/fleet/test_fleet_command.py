@@ -7,9 +7,9 @@ import sys
 
 import psutil
 import pytest
-import runs
-from in_process import answered
-from toy import soon
+from helpers import runs
+from helpers.in_process import answered
+from helpers.toy import soon
 
 from compare.__main__ import main
 from compare.core.errors import Refused

@@ -5,7 +5,7 @@ import dataclasses
 import mpmath
 import numpy as np
 import pytest
-from trees import one_body
+from helpers.trees import one_body
 
 import tmt
 from compare.engines.mujoco import engine, reading

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from judged import BOTH, INSIDE, OUTSIDE, verdicts
+from helpers.judged import BOTH, INSIDE, OUTSIDE, verdicts
+from helpers.servo_models import spring
+from helpers.trees import one_body
 from models import chain
-from servo_models import spring
-from trees import one_body
 
 import tmt
 from compare.core.check import Result

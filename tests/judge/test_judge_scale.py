@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers.trees import one_body
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
-from trees import one_body
 
 import tmt
 from compare.judge import entries, scale

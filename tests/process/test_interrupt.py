@@ -10,8 +10,8 @@ from pathlib import Path
 
 import psutil
 import pytest
-from own_equations import XML
-from runs import ENVIRONMENT, SECOND, command, compare, ended, posix, started
+from helpers.own_equations import XML
+from helpers.runs import ENVIRONMENT, SECOND, command, compare, ended, posix, started
 
 from compare.__main__ import main
 
@@ -88,7 +88,7 @@ def test_what_is_finished_is_reported_beside_an_earlier_report(tmp_path, is_earl
 
 OWN_FILE = """
 import os, signal, subprocess, sys, time
-from own_equations import acceleration, bias as right, mass_matrix
+from helpers.own_equations import acceleration, bias as right, mass_matrix
 
 how, calls = {how!r}, 0
 os.chdir("elsewhere")

@@ -9,8 +9,8 @@ import os
 import sys
 
 import pytest
+from helpers.runs import ROOT, command, compare, ended, posix, started
 from models import PATHS
-from runs import ROOT, command, compare, ended, posix, started
 
 MODULES = "fcntl grp pty pwd resource termios tty"
 SIGNALS = "SIGHUP SIGQUIT SIGUSR1 SIG_BLOCK alarm pthread_kill pthread_sigmask setitimer sigwait"

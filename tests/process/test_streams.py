@@ -2,8 +2,8 @@
 
 import os
 
-import own_equations
 import pytest
+from helpers import own_equations
 
 from compare.__main__ import main
 from compare.process import streams

@@ -9,8 +9,8 @@ from inspect import getsource
 from types import SimpleNamespace
 
 import pytest
+from helpers.runs import ENVIRONMENT, posix
 from matplotlib.figure import Figure
-from runs import ENVIRONMENT, posix
 
 from compare.core.errors import Refused
 from compare.report.folder import new_report

@@ -18,6 +18,10 @@ GOLDEN = Path(__file__).with_name("golden.md")
 NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 TIMED = "_times", "_needs", "argest speedup", "times as fast", "Cheapest for"
 NAMES = [name for name in EXPERIMENTS if name != "engines"]  # which depends on what is installed
+DEPENDS = (
+    "smallest error of",
+    "bent, held, locked:",
+)  # checks that depend on rounding: where it rules, which still joint goes
 FIXED = "#", "- *Claim", "- *Tolerance"  # lines that no run changes
 
 
@@ -30,6 +34,12 @@ def words(text, names) -> str:
     kept = [line for line in lines if line and line[0] != "|" and not any(word in line for word in TIMED)]
     said = [line if line.startswith(FIXED) else one_of.sub("~", NUMBER.sub("#", line)) for line in kept]
     return "".join(f"{line}\n" for line in said)
+
+
+def number_of_checks(name, result) -> str:
+    """How many scenes, quantities and rules an experiment checks, without measured numbers."""
+    named = {NUMBER.sub("#", f"{c.scene}, {c.quantity}, {c.rule}") for c in result.checks}
+    return f"{name}: {sum(not any(word in check for word in DEPENDS) for check in named)} kinds of check"
 
 
 def report_of_arm(small, folder) -> str:
@@ -50,6 +60,7 @@ def test_the_words_of_a_small_report(small, tmp_path, monkeypatch):
     names = {name for check in checks for name in (check.quantity, check.scene) if len(name) > 2}
     names = {NUMBER.sub("#", name) for name in names} | set(ARM.coordinates.names)
     found = words(report_of_arm(small, tmp_path), names)
+    found += "".join(f"{number_of_checks(name, small(name))}\n" for name in NAMES)
     if "RENEW" in os.environ:
         GOLDEN.write_text(found, encoding="utf-8")
     assert found.splitlines() == GOLDEN.read_text(encoding="utf-8").splitlines()

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pandas as pd
 import pytest
+from helpers.sections import BAD, GOOD, section
 from jinja2 import ChoiceLoader, DictLoader
 from matplotlib.figure import Figure as Drawing
 from models import PATHS
-from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
 from compare.core.check import About

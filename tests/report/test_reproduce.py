@@ -7,10 +7,10 @@ import sys
 
 import pandas as pd
 import pytest
-from in_process import without_workers
+from helpers.in_process import without_workers
+from helpers.runs import ROOT
+from helpers.sections import GOOD, section
 from models import PATHS
-from runs import ROOT
-from sections import GOOD, section
 
 from compare.__main__ import main
 from compare.report.reproduce import script

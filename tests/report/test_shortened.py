@@ -12,12 +12,12 @@ import sys
 from dataclasses import dataclass, make_dataclass, replace
 
 import pytest
-from in_process import without_workers
+from helpers.in_process import without_workers
+from helpers.runs import ROOT, compare, in_shell
+from helpers.sections import BAD, GOOD, section
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from runs import ROOT, compare, in_shell
-from sections import BAD, GOOD, section
 
 from compare.__main__ import main
 from compare.core.rows import Row, column

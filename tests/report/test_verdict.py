@@ -5,8 +5,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
+from helpers.sections import BAD, GOOD, section
 from matplotlib.colors import to_hex
-from sections import BAD, GOOD, section
 
 from compare.core.cause import Cause
 from compare.core.check import About, Result

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from pushed_models import INERTIA, KP, KV, LIMIT, compiled, end_speed, hinge, sphere, walker
+from helpers.pushed_models import INERTIA, KP, KV, LIMIT, compiled, end_speed, hinge, sphere, walker
 
 import compare
 from compare.engines.mujoco.reading import read

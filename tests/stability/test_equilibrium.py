@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.servo_models import robot
 from models import PATHS, random_tree
-from servo_models import robot
 
 import tmt
 from compare.stability.equilibrium import Equilibrium, equilibrium

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pushed_models import (
+from helpers.pushed_models import (
     BOX,
     FLOOR,
     INERTIA,

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.trees import one_body, random_state, small_tree, wrist
 from scipy.integrate import solve_ivp
-from trees import one_body, random_state, small_tree, wrist
 
 import tmt
 from tmt import simulation

@@ -8,8 +8,8 @@ from inspect import signature
 
 import numpy as np
 import pytest
-from many_digits import FIELDS, distance, exact
-from trees import one_body, random_states, small_tree, wrist
+from helpers.many_digits import FIELDS, distance, exact
+from helpers.trees import one_body, random_states, small_tree, wrist
 
 import tmt
 from tmt import answers, literal

@@ -8,8 +8,8 @@ from itertools import product as product_of
 import mujoco
 import numpy as np
 import pytest
-from many_digits import exact
-from trees import one_body
+from helpers.many_digits import exact
+from helpers.trees import one_body
 
 import tmt
 from tmt.compiled import Evaluator

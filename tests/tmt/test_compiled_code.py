@@ -7,9 +7,9 @@ from dataclasses import replace
 import mpmath
 import numpy as np
 import pytest
+from helpers.trees import random_state, random_states, small_tree
 from hypothesis import given
 from hypothesis import strategies as st
-from trees import random_state, random_states, small_tree
 
 import tmt
 from tmt.compiled import forms, runner, runs, straight

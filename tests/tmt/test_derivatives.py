@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from many_digits import distance, exact
+from helpers.many_digits import distance, exact
+from helpers.trees import random_states, small_tree, tree_of_kinds
 from models import PATHS
-from trees import random_states, small_tree, tree_of_kinds
 
 import tmt
 from compare.engines.mujoco import read

@@ -5,10 +5,10 @@ import dataclasses
 import mpmath
 import numpy as np
 import pytest
+from helpers.many_digits import exact
+from helpers.trees import random_state, small_tree, tree_of_kinds
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from many_digits import exact
-from trees import random_state, small_tree, tree_of_kinds
 
 import tmt
 from tmt.derivation import articulated, composite, method

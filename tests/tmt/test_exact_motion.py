@@ -8,8 +8,8 @@ from fractions import Fraction
 import mpmath
 import numpy as np
 import pytest
+from helpers.trees import one_body, random_state, small_tree, tree_of_kinds, wrist
 from models import PATHS
-from trees import one_body, random_state, small_tree, tree_of_kinds, wrist
 
 import tmt
 from compare.engines.mujoco import read

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers.trees import tree_of_kinds
 from scipy.integrate import solve_ivp
-from trees import tree_of_kinds
 
 import tmt
 

@@ -4,8 +4,8 @@ import dataclasses
 
 import numpy as np
 import pytest
+from helpers.trees import random_state, tree_of_kinds
 from scipy.integrate import DOP853
-from trees import random_state, tree_of_kinds
 
 import tmt
 from tmt.compiled import forms

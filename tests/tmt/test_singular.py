@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trees import one_body, wrist
+from helpers.trees import one_body, wrist
 
 import tmt
 from tmt.methods import METHODS, one_step

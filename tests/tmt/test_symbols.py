@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import sympy
-from trees import random_tree, small_tree, tree_of_kinds
+from helpers.trees import random_tree, small_tree, tree_of_kinds
 
 import compare
 import tmt

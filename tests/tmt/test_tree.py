@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from trees import one_body, random_tree, wrist
+from helpers.trees import one_body, random_tree, wrist
 
 import tmt
 from tmt.model.tree import stated

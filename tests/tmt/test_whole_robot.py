@@ -3,10 +3,10 @@
 import mujoco
 import numpy as np
 import pytest
-from crane import crane
-from many_digits import distance, exact
+from helpers.crane import crane
+from helpers.many_digits import distance, exact
+from helpers.trees import random_states, small_tree, tree_of_kinds
 from models import PATHS
-from trees import random_states, small_tree, tree_of_kinds
 
 import compare
 import tmt

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo_models import spring
+from helpers.servo_models import spring
 
 import tmt
 from compare.experiments.speed.runs import floor
