@@ -32,27 +32,24 @@ def script(report: Report) -> str:
 
 
 def worst_states(rows: Sequence[Any], plain: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The worst state of each quantity of an experiment."""
+    """The worst state of each quantity of an experiment: fields of MjData, and the values of its worst entry."""
     compared = [row for row in rows if hasattr(row, "mujoco_value") and row.worst_difference is not None]
-    groups = ([row for row in compared if row.quantity == quantity] for quantity in QUANTITIES)
-    return [
-        state(max(group, key=lambda row: row.difference_over_bar or 0.0), plain) for group in groups if group
-    ]
-
-
-def state(row: Any, plain: Mapping[str, Any]) -> dict[str, Any]:
-    """The worst state of a row, as fields of MjData, with the values of its worst entry."""
-    still = [0.0] * len(plain["dofs"])
-    fields = {"qpos": list(plain["first"]), "qvel": list(still), "tau": list(still)}
-    written = {"qpos": row.worst_q, "qvel": row.worst_qd, "tau": row.worst_tau}
-    for name in ("qpos", *QUANTITIES[row.quantity]):
-        places = plain["qpos" if name == "qpos" else "dofs"]
-        for place, number in zip(places, written[name].split()):
-            fields[name][place] = float(number)
-    entry = [plain["dofs"][int(k)] for k in row.worst_entry.split()]
-    values = {"other": row.worst_value, "mujoco": row.mujoco_value}
-    numbers = {"difference": row.worst_difference, "tolerance": row.bar}
-    return {"quantity": row.quantity, "entry": entry, **values, **numbers, **fields}
+    states = []
+    for quantity, asked in QUANTITIES.items():
+        group = [row for row in compared if row.quantity == quantity]
+        row = max(group, key=lambda row: row.difference_over_bar or 0.0, default=None)
+        if row is None:
+            continue
+        still = [0.0] * len(plain["dofs"])
+        fields = {"qpos": list(plain["first"]), "qvel": list(still), "tau": list(still)}
+        written = {"qpos": row.worst_q, "qvel": row.worst_qd, "tau": row.worst_tau}
+        for name in ("qpos", *asked):
+            for place, number in zip(plain["qpos" if name == "qpos" else "dofs"], written[name].split()):
+                fields[name][place] = float(number)
+        entry = [plain["dofs"][int(k)] for k in row.worst_entry.split()]
+        values = {"quantity": quantity, "entry": entry, "other": row.worst_value, "mujoco": row.mujoco_value}
+        states.append(values | {"difference": row.worst_difference, "tolerance": row.bar} | fields)
+    return states
 
 
 def lines_of(said: Mapping[str, Any]) -> list[str]:

@@ -82,8 +82,7 @@ class Mujoco(Engine):
 
         why: why it does not read this file. least: a mass for links without one, which it refuses; None: there are none.
         qpos: positions, with the places of the case's joints in them; dofs: those of their speeds. zero: fields of the model
-        to be set to zero, where all that a Tree does not have is switched off, else None. gravity: of the equations, m/s2.
-        mass_alone: M follows from masses, tensors and armature of joints alone.
+        to be set to zero, where all that a Tree does not have is switched off, else None.
         """
         m, source = self.source.model, self.source
         is_packed = "package://" in source.text
@@ -96,8 +95,7 @@ class Mujoco(Engine):
         zero = [name for name in (*NOT_HAD_FIELDS, "tendon_armature") if np.any(getattr(m, name, 0.0))]
         return of_file | {
             "first": dynamics.data.qpos.tolist(), "qpos": dynamics.qpos.tolist(), "dofs": dynamics.dofs.tolist(),
-            "zero": zero if self.bare else None, "gravity": dynamics.model.opt.gravity.tolist(),
-            "mass_alone": not rotors(m).any() and (self.bare or not np.any(m.tendon_armature)),
+            "zero": zero if self.bare else None,
         }  # fmt: skip
 
     def of(self, case: Case) -> MujocoDynamics:

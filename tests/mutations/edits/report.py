@@ -47,7 +47,7 @@ EDITS = (
     ("report.document", "Document.page", "self.report.passed", "True", "the page is green whatever fails"),
     ("verdict", "verdict", "section.record.compares and _1", "True", "what agrees is said not to"),
     ("reproduce", "script", "numbers & _1", "set()", "reproduce.py does not look into results.json"),
-    ("reproduce", "state", "QUANTITIES[row.quantity]", "()", "reproduce.py evaluates every state at rest"),
+    ("reproduce", "worst_states", "('qpos', *asked)", "('qpos',)", "reproduce.py evaluates every state at rest"),
     ("stability.push", "Pushed.recipe", "self.push * self.signs[way]", "0.0 * self.signs[way]", "reproduce.py pushes nothing"),
     ("verdict", "Report.runs_file", "section.record.runs_file", "False", "all pages say what is switched off"),
     ("folder", "refuse_foreign", "name not in own", "False", "files of somebody else's are not seen"),
