@@ -82,6 +82,7 @@ FILTERS = {
     "milliseconds": milliseconds,
     "limit": milliseconds_below,
     "capital": capital,
+    "say": lambda finding: say(finding),
 }
 
 

@@ -95,15 +95,15 @@ def judge(row: FileRow, report: Report, reference: Reference) -> None:
     sections = report.sections
     failed, top = failures(sections), worst(sections)
     checks = [check for section in sections for check in section.result.checks]
-    kinds = [kind for kind, found in failed._asdict().items() if found]
+    kinds = [kind for kind, found in failed.items() if found]
     judged = [VERDICT_OF[kind] for kind in kinds if kind in VERDICT_OF]
     row.verdict = min(judged, key=VERDICTS.index, default=ITSELF if reference.kind == "model" else AGREE)
-    said = [block("verdict", "first", checks=getattr(failed, kind), kind=kind) for kind in kinds]
-    if not any(check.about == About.MODELS for check in checks) and not failed.broke:
+    said = [block("verdict", "first", checks=failed[kind], kind=kind) for kind in kinds]
+    if not any(check.about == About.MODELS for check in checks) and not failed["broke"]:
         row.verdict, said = REFUSED, [block("fleet", "nothing_compared")]
-    elif failed.differing:
+    elif failed["differing"]:
         names = [cause.text for cause in report.causes] or said[:1]
-        said = [block("fleet", "some", reasons=names, most=3), *(said[1:2] if failed.broke else [])]
+        said = [block("fleet", "some", reasons=names, most=3), *(said[1:2] if failed["broke"] else [])]
     matched = block("fleet", "matched", renamed=reference.renamed)
     row.reason = "; ".join(filter(None, (*said, matched, *reference.otherwise)))
     row.worst_ratio = None if top is None else top.over_tolerance

@@ -17,16 +17,12 @@ from ..robots import Robot
 from . import tables
 from .images import embedded
 from .questions import answers
-from .verdict import Figure, Report, failures, headline, outcome, standing
+from .verdict import Figure, Report, failures, has_failed, headline, standing
 
-MOST_ROWS = 8  # of a table; its file has all
-FIRST_CAUSES = 4  # on the first screen
+MOST_ROWS, FIRST_CHECKS = 8, 4  # of a table, whose file has all; of the first screen
 TITLES = {"what_should_i_use": "What should I use?", "engines_answer": "Which engine?"}  # of tables
 ON_FIRST_SCREEN = "experiment", "scene", "quantity", "value", "tolerance", "note"
 JOINTS = {"hinge": "hinge", "slide": "slide", "ball": "ball joint", "free": "free joint"}
-OF_TABLES = {
-    name: getattr(tables, name) for name in ("of_cells", "of_rows", "of_checks", "of_causes", "of_origin")
-}
 
 
 class Picture(NamedTuple):
@@ -55,8 +51,7 @@ class Document:
         return joined(template.render(
             report=report, title=self.title, lines=sum(reversed(lines) if report.answers_first else lines, list[str]()),
             explained=self.explained(), pictures=self.pictures(), introduction=" ".join(introduction.split()),
-            answers=self.answers, outcome=outcome, standing=standing, headline=headline, most=MOST_ROWS,
-            most_causes=FIRST_CAUSES, titles=TITLES, **OF_TABLES,
+            answers=self.answers, standing=standing, headline=headline, most=MOST_ROWS, titles=TITLES, tables=tables,
         ))  # fmt: skip
 
     def page(self, folder: Path) -> str:
@@ -73,7 +68,7 @@ class Document:
             escaped(say(Finding("introduction", "tolerances"))),
         ]
         for section in sections:
-            texts = section.title, " ".join(section.formulas.split())
+            texts = section.title, " ".join(section.tolerance.partition("\n\n")[2].split())
             parts.append(
                 '<section id="{}">\n\n## {}\n\n{}\n\n</section>'.format(section.name, *map(escaped, texts))
             )
@@ -85,16 +80,16 @@ class Document:
         """What explains that checks fail, else the first of them, as a table with its title and how many more there are."""
         causes = self.report.causes
         if causes:
-            table = tables.of_causes(causes[:FIRST_CAUSES]).drop(columns="rank")
-            return [(table, "Cause" if len(causes) == 1 else "Causes", len(causes) - FIRST_CAUSES)]
-        failed = [check for kind in failures(self.report.sections) for check in kind]
-        table = tables.of_checks(failed[:FIRST_CAUSES], ON_FIRST_SCREEN)
-        return [(table, "Failing checks", len(failed) - FIRST_CAUSES)] if failed else []
+            table, label = tables.of_causes(causes[:MOST_ROWS]), "Cause" if len(causes) == 1 else "Causes"
+            return [(table, label, len(causes) - MOST_ROWS)]
+        failed = [check for kind in failures(self.report.sections).values() for check in kind]
+        table = tables.of_checks(failed[:FIRST_CHECKS], ON_FIRST_SCREEN)
+        return [(table, "Failing checks", len(failed) - FIRST_CHECKS)] if failed else []
 
     def pictures(self) -> list[Picture]:
         """The pictures, those in which something fails first; a figure of what fails, if none shows it."""
         sections, pictures = self.report.sections, list[Picture]()
-        wrong = [section for section in sections if any(failures([section]))]
+        wrong = [section for section in sections if has_failed([section])]
         for section in sections:
             group = [other for other in sections if other.record.overview == section.record.overview]
             fails = any(other in wrong for other in group)

@@ -12,7 +12,7 @@ import pandas as pd
 from ..core.rows import Row, columns_of
 from . import reproduce
 from .document import Document
-from .folder import files, save
+from .folder import files
 from .verdict import Report
 
 COMPUTED = "=", "+", "-", "@", "\t", "\r"  # how the texts begin that a spreadsheet would compute
@@ -39,6 +39,10 @@ def write(folder: Path, report: Report) -> None:
         "provenance": report.origin | {"files": [*files(folder), "results.json"]},
     }
     save(folder / "results.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
+
+
+def save(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def csv(rows: Sequence[Row], columns: Sequence[str] = ()) -> str:

@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -52,12 +51,8 @@ def new_report(out: str | Path, shown: str | Path = "") -> Iterator[Path]:
             yield work
             exchange(work, out, shown)
         except OSError as error:
-            path = Path(str(error.filename))
-            if not path.is_relative_to(work):
-                raise
             state = f"; {UNCHANGED}" if is_old else ""
-            path = shown / path.relative_to(work)  # as the reader knows it
-            raise Refused(f"cannot write {path}: {error.strerror}{state}") from None
+            raise Refused(f"cannot write to {shown}: {error.strerror or error}{state}") from None
 
 
 def has_report(out: Path) -> bool:
@@ -70,26 +65,19 @@ def exchange(work: Path, out: Path, shown: Path) -> None:
     with locked(out), interrupt.undivided(), ExitStack() as back:
         refuse_foreign(out, shown)
         old = Path(tempfile.mkdtemp(prefix="old-", dir=work))
-        try:
-            for name in OWN:
-                for source, target in ((out / name, old / name), (work / name, out / name)):
-                    if os.path.lexists(source):
-                        os.replace(source, target)
-                        back.callback(os.replace, target, source)
-        except OSError as error:
-            back.close()
-            state = f"; {UNCHANGED}" if has_report(out) else ""
-            raise Refused(f"cannot replace the report in {shown}: {error.strerror}{state}") from None
+        for name in OWN:
+            for source, target in ((out / name, old / name), (work / name, out / name)):
+                if os.path.lexists(source):
+                    os.replace(source, target)
+                    back.callback(os.replace, target, source)
         back.pop_all()
         interrupt.settle()
 
 
 def clear_away(out: Path) -> None:
     """Delete what killed runs have left; the folder of a run that goes on is locked, and stays."""
-    for work in sorted(out.glob(".new-*")):
-        is_of_a_run = (
-            re.fullmatch(r"\.new-[a-z0-9_]{8}", work.name) and not work.is_symlink() and work.is_dir()
-        )
+    for work in sorted(out.glob(".new-????????")):
+        is_of_a_run = work.is_dir() and not work.is_symlink()
         if is_of_a_run and {child.name for child in work.iterdir()} <= {*OWN}:
             with locked(work, wait=False) as is_left:
                 if is_left:
@@ -120,20 +108,6 @@ def what_is_wrong(out: Path, error: OSError) -> str:
         if os.path.exists(path) and not os.path.isdir(path):
             return f"{name} is a file"
     return error.strerror or str(error)
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Errors of the disk in this block name the file; those of Python do not."""
-    try:
-        yield
-    except OSError as error:
-        raise OSError(error.errno, error.strerror or str(error), str(path)) from None
-
-
-def save(path: Path, text: str) -> None:
-    with writing(path):
-        path.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def files(folder: Path) -> list[str]:

@@ -12,7 +12,7 @@ from ..core.rows import Column, Row, columns_of
 
 LONGEST_LIST = 80  # characters of a list in a report; its file has all
 EVERY_DIGIT = Column(digits=7)
-CAUSE = {"rank": Column(), "place": Column(), "stated": EVERY_DIGIT, "found": EVERY_DIGIT, "text": Column()}
+CAUSE = {"place": Column(), "stated": EVERY_DIGIT, "found": EVERY_DIGIT, "text": Column()}
 CHECK = ["experiment", "scene", "quantity", "value", "tolerance", "unit", "note", "rule"]  # columns
 IN_WORDS = {"seconds_of": "CPU seconds", "ended_after_s": "seconds from the start to the end"}
 

@@ -15,6 +15,14 @@ from ..robots import Robot
 
 UNKNOWN = Experiment()
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
+# kinds of checks that fail, by what they are about; only the first say that the two models differ
+KINDS = {
+    "differing": About.MODELS,
+    "broke": About.PROGRAM,
+    "unstable": About.STEP,
+    "unconfirmed": About.PREDICTION,
+    "of_engines": About.ENGINE,
+}
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
 
@@ -52,18 +60,6 @@ class Section:
     record: Experiment = UNKNOWN  # what the program knows of it
 
     @property
-    def tolerance_in_words(self) -> str:
-        return " ".join(self.tolerance.partition("\n\n")[0].split())
-
-    @property
-    def formulas(self) -> str:
-        return self.tolerance.partition("\n\n")[2]
-
-    @property
-    def notes(self) -> list[str]:
-        return [say(note) for note in self.result.notes]
-
-    @property
     def tables(self) -> dict[str, list[Row]]:
         """Its tables that have rows, by their names; its own first."""
         tables = {self.name: self.result.rows} | self.result.tables
@@ -96,14 +92,11 @@ class Section:
         return [figure for figure in self.figures if not figure.is_overview]
 
     @property
-    def first_figures(self) -> list[Figure]:
-        """Those that are not folded."""
+    def folding(self) -> tuple[list[Figure], list[Figure]]:
+        """Its own figures that are not folded, and the others."""
         most = MOST_FIGURES if len(self.own_figures) <= MOST_FIGURES else FIRST_FIGURES
-        return [figure for k, figure in enumerate(self.own_figures) if k < most or figure.moves]
-
-    @property
-    def folded_figures(self) -> list[Figure]:
-        return [figure for figure in self.own_figures if figure not in self.first_figures]
+        first = [figure for k, figure in enumerate(self.own_figures) if k < most or figure.moves]
+        return first, [figure for figure in self.own_figures if figure not in first]
 
 
 Sections = Sequence[Section]
@@ -159,28 +152,22 @@ class Report(NamedTuple):
         return lines or [f"{capital(number)}." for number in numbers if number]
 
 
-class Failures(NamedTuple):
-    """The checks that fail, by what they are about; only the first say that the two models differ."""
-
-    differing: list[Check]
-    broke: list[Check]
-    unstable: list[Check]
-    unconfirmed: list[Check]
-    of_engines: list[Check]
-    not_judged: list[Check]
-
-
-def failures(sections: Sections) -> Failures:
-    """The checks that fail, by their kinds, and those that were not judged."""
+def failures(sections: Sections) -> dict[str, list[Check]]:
+    """The checks that fail, by their KINDS, and those that were not judged."""
     checks = [check for section in sections for check in section.result.checks]
-    kinds = About.MODELS, About.PROGRAM, About.STEP, About.PREDICTION, About.ENGINE
-    failed = [[check for check in checks if check.failed and check.about == kind] for kind in kinds]
-    return Failures._make([*failed, [check for check in checks if not check.judged]])
+    failed = [check for check in checks if check.failed]
+    failing = {kind: [check for check in failed if check.about == about] for kind, about in KINDS.items()}
+    return failing | {"not_judged": [check for check in checks if not check.judged]}
+
+
+def has_failed(sections: Sections) -> bool:
+    """Whether a check fails, or was not judged."""
+    return any(failures(sections).values())
 
 
 def passed(sections: Sections) -> bool:
     """Whether something was compared, no check fails, and all were judged."""
-    return any(section.judged for section in sections) and not any(failures(sections))
+    return any(section.judged for section in sections) and not has_failed(sections)
 
 
 def worst(sections: Sections) -> Check | None:
@@ -200,28 +187,25 @@ def verdict(
     checked = [section for section in sections if section.result.checks]
     checks = [check for section in checked for check in section.judged]
     failing, top = failures(checked), worst(checked)
-    differing = [section for section in checked if section.record.compares and failures([section]).differing]
+    differing = [
+        section for section in checked if section.record.compares and failures([section])["differing"]
+    ]
     lines = block(
         "verdict", "verdict", compared=subject or "The two models", robot=robot or "the robot",
         experiments=experiments, sections=sections, checked=checked, checks=checks, causes=causes,
         names=[section.name for section in differing or checked], differ=bool(differing), failing=failing,
-        top=top if top and top.value and not any(failing) else None,
+        top=top if top and top.value and not has_failed(checked) else None,
     )  # fmt: skip
     return "\n".join(filter(None, map(str.strip, lines.split("\n"))))
 
 
-def outcome(section: Section, kind: str = "outcome") -> str:
-    """Whether a section passes, in a sentence; `standing`: in a few words."""
-    numbers = {"checks": section.judged, "failed": section.failed}
-    counts = {name: len(checks) for name, checks in numbers.items()}
-    return say(Finding("verdict", kind, {**counts, "failing": failures([section])}))
-
-
 def standing(section: Section) -> tuple[bool | None, str]:
     """Whether a section passes, also in words; None: not all was judged, or nothing compared."""
-    *failing, not_judged = failures([section])
-    is_open = bool(not_judged) or not section.judged
-    return (False if any(failing) else None if is_open else True), outcome(section, "standing")
+    failing = failures([section])
+    words = block("verdict", "standing", checks=len(section.judged), failing=failing)
+    if section.failed:
+        return False, words
+    return (None if failing["not_judged"] or not section.judged else True), words
 
 
 def headline(section: Section) -> str:

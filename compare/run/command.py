@@ -94,18 +94,18 @@ def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
     from .examine import SHOWN, lines_of
 
     failing = failures(report.sections)
-    verdict = report.verdict.split("\n")[: 2 if failing.unstable else 1]
-    if report.causes and failing.differing:  # what is not judged or confirmed follows from it
-        failing = failing._replace(not_judged=[], unconfirmed=[])
+    verdict = report.verdict.split("\n")[: 2 if failing["unstable"] else 1]
+    if report.causes and failing["differing"]:  # what is not judged or confirmed follows from it
+        failing = failing | {"not_judged": [], "unconfirmed": []}
     others = block("verdict", "others", failing=failing).splitlines()
     mended = [block("run", "mended", states=states)] if states else []
     if not is_alone:
         return [*verdict, *mended, *others]
     causes = [line for cause in report.causes[:SHOWN] for line in lines_of(cause)]
     if report.answers_first:
-        differs = [*verdict[-1:], *causes] if failing.differing or failing.broke else []
+        differs = [*verdict[-1:], *causes] if failing["differing"] or failing["broke"] else []
         return [*report.answer, *differs, *others]
-    checks = [f"  {check}" for check in failing.differing[:MOST_FAILING]] if not causes else []
+    checks = [f"  {check}" for check in failing["differing"][:MOST_FAILING]] if not causes else []
     section = report.sections[0]
     has_number = section.result.headline and (section.record.compares or not causes)
     answer = report.answer if has_number or report.top else []

@@ -10,7 +10,6 @@ from ..core.check import Result
 from ..core.text import say
 from ..experiments import EXPERIMENTS, functions
 from ..report import images
-from ..report.folder import writing
 from ..report.verdict import Figure, Section
 from ..robots import Robot
 
@@ -32,8 +31,7 @@ def draw(
             while file.casefold() in {other.file.casefold() for other in drawn}:
                 file += "_"  # names that differ in signs alone may give one file
             path = folder / f"{file}{getattr(figure, 'suffix', '.png')}"
-            with writing(path):
-                images.save_figure(figure, path)
+            images.save_figure(figure, path)
             drawn.append(Figure(path.name.removesuffix(".png"), say(caption)))
     return drawn
 

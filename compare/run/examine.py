@@ -20,7 +20,7 @@ from ..experiments.setup import Setup, engines
 from ..process import interrupt
 from ..process.workers import Clock, Current, WorkerEnded, Workers, give_back_memory
 from ..report.terminal import Terminal
-from ..report.verdict import Figure, Section, failures
+from ..report.verdict import Figure, Section, failures, has_failed
 from ..robots import Robot
 from ..robots.states import MOST_SPEEDS
 from .drawing import draw, quiet, results_needed
@@ -144,7 +144,7 @@ class Run:
 
     def needless(self, name: str) -> str:
         """Why an experiment is left out of a run of several; "" if it is not."""
-        is_needed = EXPERIMENTS[name].compares or len(self.names) == 1 or failures(self.sections).differing
+        is_needed = EXPERIMENTS[name].compares or len(self.names) == 1 or failures(self.sections)["differing"]
         return self.too_long(name) if is_needed else block("run", "nothing_failed")
 
     def too_long(self, name: str) -> str:
@@ -170,7 +170,7 @@ class Run:
         if name not in TIMED:  # no drawing delays a timing
             self.draw(section)
         self.unsaid.append(section)
-        if not failures(self.sections).differing:
+        if not failures(self.sections)["differing"]:
             self.say_outcomes()
 
     def say_outcomes(self) -> None:
@@ -180,17 +180,17 @@ class Run:
         for section in [] if is_said else waiting:
             failing = failures([section])
             about = {"checks": len(section.result.checks), "failed": len(section.failed), "failing": failing}
-            style = "red" if section.failed else "yellow" if failing.not_judged else ""
+            style = "red" if section.failed else "yellow" if failing["not_judged"] else ""
             seconds = self.clock.seconds_of(section.name)
             self.terminal.say(block("run", "outcome", name=section.name, seconds=seconds, **about), style)
-            if failing.differing and not is_said:
+            if failing["differing"] and not is_said:
                 lines, more = (
                     [line for cause in self.causes[:SHOWN] for line in lines_of(cause)],
                     len(self.causes) - SHOWN,
                 )
                 lines += [f"  {block('run', 'more', count=more)}"] if more > 0 else []
-                is_first = not lines or failing.differing[0].quantity.endswith(VALID)
-                for line in [f"  first: {failing.differing[0]}"] * is_first + lines:
+                is_first = not lines or failing["differing"][0].quantity.endswith(VALID)
+                for line in [f"  first: {failing['differing'][0]}"] * is_first + lines:
                     self.terminal.say(line)
                 is_said = True
 
@@ -204,7 +204,7 @@ class Run:
 
     def draw(self, section: Section) -> None:
         if section.name not in self.crashed:
-            is_short = self.few or not any(failures([section]))
+            is_short = self.few or not has_failed([section])
             few = self.setup.is_quick and not self.setup.alone and is_short
             others = results_needed(section.name, self.order, self.sections)
             arguments = section.name, section.result, self.setup.robot, self.folder / "figures", others, few
@@ -265,7 +265,7 @@ def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]
     Where numbers are stated they are those that differ; one convention, number or slip that explains those in M
     and h stands in their place. Else they are what the search finds, and the numbers at other places.
     """
-    if not failures(sections).differing:
+    if not failures(sections)["differing"]:
         return [], 0
     numbers = list[Cause]()
     if not setup.robot.own:
