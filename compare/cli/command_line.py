@@ -100,7 +100,12 @@ def request(arguments: Sequence[str]) -> tuple[str, Options]:
             words[at : at + 2] = [f"{option}={words[at + 1]}"]
     made = parser(command)
     values, unknown = made.parse_known_args(words)
-    refuse_words(made, command, unknown)
+    for word in sorted(unknown, key=lambda word: not word.startswith("-"))[:1]:
+        if not word.startswith("-"):
+            made.error(f"unexpected argument {word!r}: expected one experiment, or all")
+        if takers := [name for name in EXPERIMENTS if word.split("=")[0] in options_in(options_of(name))]:
+            made.error(f"{word} is an option of {', '.join(takers)}; {command} does not take it")
+        made.refuse_option(word, list(options_in(options_of(command))))
     if values.help:
         made.description = block(TEXT, "help_of_all") if command == ALL else help_of(command)
         made.print_help()
@@ -127,15 +132,3 @@ def refuse_command(command: str, arguments: Sequence[str]) -> NoReturn:
     others = [word for word in arguments if word != first]
     what = f"{first} must come first" if later else f"expected an experiment: {', '.join(EXPERIMENTS)} or all"
     made.error(f"{what}, as in {PROGRAM} {first} {shlex.join(others)}")
-
-
-def refuse_words(made: Parser, command: str, unknown: Sequence[str]) -> None:
-    """End with one line if a word is no option of this command."""
-    for word in unknown:
-        if word.startswith("-"):
-            takers = [name for name in EXPERIMENTS if word.split("=")[0] in options_in(options_of(name))]
-            if takers:
-                made.error(f"{word} is an option of {', '.join(takers)}; {command} does not take it")
-            made.refuse_option(word, list(options_in(options_of(command))))
-    if unknown:
-        made.error(f"unexpected argument {unknown[0]!r}: expected one experiment, or all")

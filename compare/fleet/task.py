@@ -57,10 +57,10 @@ def compare_file(shown: str, path: str, place: str, options: FleetOptions) -> Fi
         return row
     setup = experiment.setup_of(compared, Options(quick=options.is_quick))
     with folder.new_report(place) as out, ThreadPoolExecutor(1) as workers:
-        examined = experiment.Run(names, setup, out, Terminal(), workers, few=True).examined()
+        run = experiment.Run(names, setup, out, Terminal(), workers, few=True).examined()
         origin = provenance.provenance(options.command(shown), compared.robot.mjcf, shown, SEED)
         origin["seconds"] = round(time.process_time() - began, 1)
-        report = write_report(out, examined, reasons, origin, compared)
+        report = write_report(out, run, reasons, origin, compared)
     judge(row, report, compared.reference)
     row.seconds, row.has_report = round(time.process_time() - began, 2), True
     return row

@@ -32,7 +32,7 @@ from ..robots.states import MOST_SPEEDS
 from .reference import Compared, compared_with
 
 if TYPE_CHECKING:  # they take long to load
-    from .examine import Examined, Run
+    from .examine import Run
 
 # modules that take long to load
 DRAWING, COMPUTING = "compare.report.style", "tmt.compiled.machine"
@@ -125,10 +125,10 @@ def compute(
 
     def written(is_complete: bool = True) -> Report:
         assert run is not None
-        found = run.examined() if is_complete else run.finished()
+        ended = run.examined() if is_complete else run.finished()
         times = {"seconds": round(time.perf_counter() - started, 1)} | durations(run.clock)
-        left_out.update({name: why for name, why in found.needless.items() if name != "diagnosis"})
-        return write_report(folder, found, reasons, origin | times, compared, [] if is_complete else names)
+        left_out.update({name: why for name, why in run.needless.items() if name != "diagnosis"})
+        return write_report(folder, ended, reasons, origin | times, compared, [] if is_complete else names)
 
     def write_finished() -> None:
         """After an interrupt: the experiments that are finished, beside an earlier report."""
@@ -169,7 +169,7 @@ def applying(
 
 
 def write_report(
-    folder: Path, examined: "Examined", reasons: dict[str, str], origin: dict[str, Any], compared: Compared,
+    folder: Path, run: "Run", reasons: dict[str, str], origin: dict[str, Any], compared: Compared,
     interrupted: Sequence[str] = (),
 ) -> Report:  # fmt: skip
     """Write a report with its verdict to a folder that has its figures.
@@ -178,11 +178,10 @@ def write_report(
     """
     from ..report import files, verdict
 
-    sections, causes, needless = examined
+    sections, causes, left_out = run.sections, run.causes, reasons | run.needless
     reference, robot, *_ = compared
-    count = len(interrupted or EXPERIMENTS) - len(needless)
+    count = len(interrupted or EXPERIMENTS) - len(run.needless)
     words = verdict.verdict(sections, count, causes, reference.subject, robot.name)
-    left_out = reasons | needless
     if interrupted:
         names = [section.name for section in sections]
         numbers = {"finished": len(names), "experiments": len(interrupted)}

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Self, TypeVar
 
 from ..core.cause import Cause
 from ..core.check import ENDS, About, Result
@@ -31,25 +31,8 @@ START, END = "start", "figures"  # tasks of the clock: before the first experime
 SHOWN = 3  # causes on the terminal
 VALID = "returns valid values"  # of a function of the user's own
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = (
-    "order",
-    "parent",
-    "ref",
-    "axis",
-    "anchor",
-    "com",
-    "mass",
-    "inertia",
-    "gravity",
-    "armature",
-    "flag gravity",
-)
-
-
-class Examined(NamedTuple):
-    sections: list[Section]  # of each experiment, in the order of their names
-    causes: list[Cause]  # of failing checks
-    needless: dict[str, str]  # experiments that were skipped, and why
+IN_EQUATIONS = ["order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature"]
+IN_EQUATIONS += ["flag gravity"]
 
 
 def setup_of(compared: Compared, options: Options, **more: Any) -> Setup:
@@ -79,8 +62,9 @@ class Run:
     terminal: Terminal
     workers: Executor | Workers
     clock: Clock = field(default_factory=lambda: Current.clock)
-    sections: list[Section] = field(default_factory=list)
-    causes: list[Cause] = field(default_factory=list)
+    sections: list[Section] = field(default_factory=list)  # in the end in the order of the names
+    causes: list[Cause] = field(default_factory=list)  # of failing checks
+    needless: dict[str, str] = field(default_factory=dict)  # experiments that were left out, and why
     work: dict[str, Any] = field(default_factory=dict)  # that was begun, of each experiment
     crashed: dict[str, Result] = field(default_factory=dict)
     told: set[int] = field(default_factory=set)  # problems of the user's own equations, by their numbers
@@ -95,7 +79,7 @@ class Run:
         self.order = sorted(self.names, key=(("kinematics", *last) if is_large else last).__contains__)
         self.early = () if is_large else [name for name in self.order if not self.too_long(name)]
 
-    def examined(self) -> Examined:
+    def examined(self) -> Self:
         """The experiments, one after the other."""
         (self.folder / "figures").mkdir()
         for name in self.early:
@@ -103,31 +87,31 @@ class Run:
                 with self.clock.of(name):
                     self.work[name] = self.attempt(name, begin, self.setup)
         self.clock.ends(START)
-        needless = {}
         for name in self.order:
-            if reason := self.needless(name):
-                needless[name] = reason
+            if reason := self.why_needless(name):
+                self.needless[name] = reason
                 self.clock.ends(name)
             else:
                 self.examine(name)
         self.causes, self.mended = self.attempt("causes", causes, self.setup, self.sections) or ([], 0)
         self.say_outcomes()
         self.finish_drawings()
-        sections = sorted(self.sections, key=lambda section: self.names.index(section.name))
-        return Examined(sections, self.causes, needless)
+        self.sections.sort(key=lambda section: self.names.index(section.name))
+        return self
 
-    def finished(self) -> Examined:
+    def finished(self) -> Self:
         """What is finished after an interrupt, without the figures that were not drawn."""
-        names = [name for name in self.names if name in self.clock.ended]
         for section, drawing in self.drawings:
             if drawing.done() and not drawing.exception():
                 section.figures = drawing.result()
-        sections = [section for name in names for section in self.sections if section.name == name]
-        drawn = {figure.path for section in sections for figure in section.figures}
+        self.sections = [section for section in self.sections if section.name in self.clock.ended]
+        self.sections.sort(key=lambda section: self.names.index(section.name))
+        self.needless = {}
+        drawn = {figure.path for section in self.sections for figure in section.figures}
         for path in (self.folder / "figures").iterdir():
             if path.name not in drawn:  # perhaps a part of a file
                 path.unlink()
-        return Examined(sections, self.causes, {})
+        return self
 
     def attempt(self, name: str, act: Callable[..., Value], *arguments: Any) -> Value | None:
         """act(*arguments); if it raises, None, and the experiment has crashed."""
@@ -142,7 +126,7 @@ class Run:
                 add_crash(self.crashed[name], ENDS, error)
             return None
 
-    def needless(self, name: str) -> str:
+    def why_needless(self, name: str) -> str:
         """Why an experiment is left out of a run of several; "" if it is not."""
         is_needed = EXPERIMENTS[name].compares or len(self.names) == 1 or failures(self.sections)["differing"]
         return self.too_long(name) if is_needed else block("run", "nothing_failed")
@@ -175,20 +159,18 @@ class Run:
 
     def say_outcomes(self) -> None:
         """The lines of experiments of a run of several; the causes beneath the first that differs, else its first check."""
-        waiting, self.unsaid = self.unsaid, []
-        is_said = len(self.names) == 1
-        for section in [] if is_said else waiting:
+        waiting, self.unsaid = self.unsaid if len(self.names) > 1 else [], []
+        is_said = False
+        for section in waiting:
             failing = failures([section])
             about = {"checks": len(section.result.checks), "failed": len(section.failed), "failing": failing}
             style = "red" if section.failed else "yellow" if failing["not_judged"] else ""
             seconds = self.clock.seconds_of(section.name)
             self.terminal.say(block("run", "outcome", name=section.name, seconds=seconds, **about), style)
             if failing["differing"] and not is_said:
-                lines, more = (
-                    [line for cause in self.causes[:SHOWN] for line in lines_of(cause)],
-                    len(self.causes) - SHOWN,
-                )
-                lines += [f"  {block('run', 'more', count=more)}"] if more > 0 else []
+                lines = [line for cause in self.causes[:SHOWN] for line in lines_of(cause)]
+                if (more := len(self.causes) - SHOWN) > 0:
+                    lines.append(f"  {block('run', 'more', count=more)}")
                 is_first = not lines or failing["differing"][0].quantity.endswith(VALID)
                 for line in [f"  first: {failing['differing'][0]}"] * is_first + lines:
                     self.terminal.say(line)

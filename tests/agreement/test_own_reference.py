@@ -46,9 +46,9 @@ def examined(folder, asked, names, mjcf="double.xml", joints=None, states=30, wo
     reference, robot, mujoco, reading = compared_with(asked, str(mjcf), joints)
     of = {"states": states, "exact_states": 1, "finer": (1,), "size": "quick", "reading": reading}
     setup = Setup(robot, engines(mujoco, reference.own), **of)
-    sections, causes, _ = experiment.Run(names, setup, Path(mkdtemp(dir=folder)), Lines(), workers).examined()
-    failed = [check for section in sections for check in section.result.checks if not check.passed]
-    return SimpleNamespace(sections=sections, causes=causes, robot=robot, failed=failed)
+    run = experiment.Run(names, setup, Path(mkdtemp(dir=folder)), Lines(), workers).examined()
+    failed = [check for section in run.sections for check in section.result.checks if not check.passed]
+    return SimpleNamespace(sections=run.sections, causes=run.causes, robot=robot, failed=failed)
 
 
 @pytest.mark.parametrize("asked, joints", [

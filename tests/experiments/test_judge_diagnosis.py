@@ -52,7 +52,7 @@ def test_beside_others_it_is_made_where_one_fails(names, text, made, found, tmp_
     # not by parameters, but in the values
     monkeypatch.setattr(parameters, "rows", lambda setup: Result("parameters"))
     setup = setup_of(text, make=experiment.Setup, states=20, exact_states=1, size="small")
-    sections, causes, reasons = experiment.Run(names, setup, tmp_path, Lines(), InProcess()).examined()
-    assert [section.name for section in sections] == made
-    assert list(reasons) == [name for name in names if name not in made]
-    assert [cause.place for cause in causes] == found
+    run = experiment.Run(names, setup, tmp_path, Lines(), InProcess()).examined()
+    assert [section.name for section in run.sections] == made
+    assert list(run.needless) == [name for name in names if name not in made]
+    assert [cause.place for cause in run.causes] == found

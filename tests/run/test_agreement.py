@@ -49,13 +49,13 @@ def test_all_experiments_pass_and_draw_and_the_report_is_of_the_second_robot(tmp
     assert [name for name in reasons if name != "engines"] == ["published"]
     setup = Setup.small(robot, engines(parse(robot.mjcf, robot.tree)))
     names = [name for name in EXPERIMENTS if name not in reasons]
-    sections, causes, _ = Run(names, setup, tmp_path, Lines(), InProcess()).examined()
-    words = verdict.verdict(sections, len(EXPERIMENTS), causes)
-    report = verdict.Report(sections, robot, {"command": "c"}, words, causes, list(reasons.items()))
+    run = Run(names, setup, tmp_path, Lines(), InProcess()).examined()
+    words = verdict.verdict(run.sections, len(EXPERIMENTS), run.causes)
+    report = verdict.Report(run.sections, robot, {"command": "c"}, words, run.causes, list(reasons.items()))
     files.write(tmp_path, report)
     figures = tmp_path.joinpath("figures").iterdir()
     sizes = {path.name.removesuffix(".png"): path.stat().st_size for path in figures}
-    for section in sections:
+    for section in run.sections:
         assert section.name == "diagnosis" or section.result.checks
         assert [str(check) for check in section.result.checks if not check.passed] == []
         assert all(sizes[figure] > 5000 and caption for figure, caption in section.figures)

@@ -187,14 +187,14 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
         made(monkeypatch, name, rows=partial(rows, name), figures=partial(figures, name))
     setup = SimpleNamespace(own=None, robot=ARM, progress=lambda text: None, is_quick=False, alone=True)
     setup.options = Options()
-    sections, causes, skipped = experiment.Run(names, setup, tmp_path, Terminal(), Writing(log)).examined()
+    run = experiment.Run(names, setup, tmp_path, Terminal(), Writing(log)).examined()
     assert log == [
         ("rows", "mass"), ("figures", "mass"), ("rows", "stability"), ("figures", "stability"),
         ("rows", "trajectory"), ("figures", "trajectory"), ("rows", "speed"), ("rows", "derivatives"),
         ("figures", "speed"), ("figures", "derivatives"),
     ]  # fmt: skip
-    assert [section.name for section in sections] == names and (causes, skipped) == ([], {})
-    for section_of_name, name in zip(sections, names):
+    assert [section.name for section in run.sections] == names and (run.causes, run.needless) == ([], {})
+    for section_of_name, name in zip(run.sections, names):
         assert [figure.file for figure in section_of_name.figures] == [f"{name}_{k}" for k in range(3)]
 
 

@@ -56,7 +56,7 @@ EDITS = (
     ("folder", "exchange", "back.callback(*_1)", "None", "the old report is not put back"),
     ("verdict", "Report.passed", "self.is_complete and _1", "_1", "what was interrupted has passed"),
     ("run.command", "compute", "has_report(_1)", "False", "an earlier report gives way to one that is not complete"),
-    ("run.examine", "Run.finished", "name in self.clock.ended", "True", "what is under way is reported as finished"),
+    ("run.examine", "Run.finished", "section.name in self.clock.ended", "True", "what is under way is reported as finished"),
     ("process.streams", "Capped.write", "MOST_PRINTED - Capped.printed", "MOST_PRINTED", "own code prints without end"),
     ("process.streams", "Capped.write", "len(text) > room", "False", "nobody is told that no more is printed"),
     ("core.cause", "Cause.record", "not isfinite(value)", "False", "a cause that is no number spoils results.json"),
