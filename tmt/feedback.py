@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike
 
 from tmt.answers import answered
 from tmt.compiled.evaluator import SMALL, Evaluator
-from tmt.compiled.trace import Expression, Tape
+from tmt.compiled.trace import Tape
+from tmt.derivation.dual import jacobian
+from tmt.derivation.form import COMPOSITE
 from tmt.derivation.vectors import Values
-from tmt.methods.derivatives import COMPOSITE
-from tmt.methods.stepping import DIVERGED, Dynamics, Method
+from tmt.methods.stepping import DIVERGED, Method
 from tmt.model.tree import Tree
 from tmt.model.values import real_numbers, shown
 
@@ -28,74 +29,36 @@ def as_gains(model: Tree, torque: Torque) -> tuple[Tree, Array, Torque | None]:
 
     Else the model as it is, zeros, and the torque.
     """
-    driven = with_gains(model, torque)
-    return (*driven, None) if driven else (model, np.zeros(model.nv), torque)
-
-
-def with_gains(model: Tree, torque: Torque) -> tuple[Tree, Array] | None:
-    try:
-        law = linear(model, torque)
-    except Exception:  # whatever a user's function raises of arguments that are no numbers
-        return None
-    if law is None:
-        return None
-    constant, by_q, by_qd = law
+    nq, nv, nothing = model.nq, model.nv, np.zeros(model.nv)
     first = np.array(model.coordinates.first_positions)
-    of_balls = [k for joint in model.coordinates.balls for k in range(joint.q.start, joint.q.stop)]
-    if by_q[:, of_balls].any():
-        return None
-    nothing = np.zeros((model.nv, model.nv))
-    gains = {"position_gain": by_q[:, first], "speed_gain": by_qd}
-    try:
-        stated = {name: np.array(getattr(model, name) or nothing) - gain for name, gain in gains.items()}
-        driven = replace(model, **stated)
-    except ValueError:  # of the speeds of a ball
-        return None
+    try:  # the derivatives of a trace are numbers where the function is linear
+        tape, zero = Tape(), np.array(model.zero)
+        rows = jacobian(lambda x: by_place(torque, x, nq), tape.inputs(*range(1 + nq + nv)))
+        by = np.array([[tape.lift(x).number for x in row] for row in rows], dtype=float)
+        by_q, by_qd = by[:, 1 + first], by[:, 1 + nq :]
+        driven = with_gains(model, by_q, by_qd)
+        constant = checked(model, torque, 0.0, zero, nothing) - by_q @ zero[first]
+    except Exception:  # whatever a user's function raises of arguments that are no numbers; gains of a ball
+        return model, nothing, torque
     rng = np.random.default_rng(0)
     for _ in range(TRIED):
-        t, (q, qd) = float(rng.normal()), rng.normal(size=(2, model.nq))
-        expected = constant + by_q @ q + by_qd @ qd[: model.nv]
-        found = checked(model, torque, t, q, qd[: model.nv])
+        x = rng.normal(size=1 + nq + nv)
+        expected = constant + by_q @ x[1 + first] + by_qd @ x[1 + nq :]
+        found = checked(model, torque, float(x[0]), x[1 : 1 + nq], x[1 + nq :])
         if not np.allclose(found, expected, rtol=ROUNDED, atol=ROUNDED):
-            return None
-    return driven, constant
+            return model, nothing, torque
+    return driven, constant, None
 
 
-def linear(model: Tree, torque: Torque) -> tuple[Array, Array, Array] | None:
-    """The constant part and the factors of q and qd, from a trace of the function; None where it is not linear."""
-    tape, nq, nv = Tape(), model.nq, model.nv
-    inputs = tape.inputs(*range(1 + nq + nv))
-    arrays = (np.array(part, dtype=object) for part in (inputs[1 : 1 + nq], inputs[1 + nq :]))
-    rows = [factors(tape, tape.lift(x), len(inputs)) for x in np.ravel(torque(inputs[0], *arrays))]  # type: ignore[arg-type]
-    if any(row is None for row in rows) or len(rows) != nv:
-        return None
-    matrix = np.array(rows)
-    return None if matrix[:, 1].any() else (matrix[:, 0], matrix[:, 2 : 2 + nq], matrix[:, 2 + nq :])
+def by_place(torque: Torque, x: Values, nq: int) -> Values:
+    state = (np.array(part, dtype=object) for part in (x[1 : 1 + nq], x[1 + nq :]))
+    return list(np.ravel(torque(x[0], *state)))
 
 
-def factors(tape: Tape, x: Expression, inputs: int) -> Array | None:
-    """A constant and the factor of each input, (1 + inputs,), of a linear expression; else None."""
-    operation, arguments = tape.nodes[x.i]
-    row = np.zeros(1 + inputs)
-    if operation == "number":
-        row[0] = arguments[0]
-        return row
-    if operation == "input":
-        row[1 + arguments[0]] = 1.0
-        return row
-    if operation not in ("+", "-", "neg", "*", "/"):
-        return None
-    parts = [factors(tape, Expression(tape, i), inputs) for i in arguments]
-    rows = [part for part in parts if part is not None]
-    if len(rows) < len(parts):
-        return None
-    if operation in ("*", "/"):
-        numbers = [k for k, part in enumerate(rows) if not part[1:].any()]
-        if not numbers or (operation == "/" and 1 not in numbers):
-            return None
-        number = rows[numbers[-1]][0]
-        return rows[1 - numbers[-1]] * (number if operation == "*" else 1.0 / number)
-    return {"neg": np.negative, "+": np.add, "-": np.subtract}[operation](*rows)
+def with_gains(model: Tree, by_q: Array, by_qd: Array) -> Tree:
+    nothing = np.zeros((model.nv, model.nv))
+    gains = {"position_gain": by_q, "speed_gain": by_qd}
+    return replace(model, **{x: np.array(getattr(model, x) or nothing) - gain for x, gain in gains.items()})
 
 
 def checked(model: Tree, torque: Torque, t: float, q: Array, qd: Array) -> Array:
@@ -116,10 +79,9 @@ def follow(
     As Runner.follow; the function is asked with one state at a time, at each stage of a step.
     """
     steps, codes, evaluations = (q.shape[1] - 1) * every, np.zeros((len(q), 2), np.int64), 0
-    times = getattr(stepping, "c", (0.0,))
-    is_plain = type(stepping).slope is Method.slope
+    times, is_plain = getattr(stepping, "c", (0.0,)), type(stepping).slope is Method.slope
     many = is_plain and len(q) * steps * stepping.stages > SMALL
-    evaluator, dynamics = Evaluator(model, "acceleration") if many else None, Dynamics(COMPOSITE)
+    evaluator = Evaluator(model, "acceleration") if many else None
 
     def slope_at(begun: float) -> Callable[[Values, Values], Values]:
         stages = iter(times)
@@ -128,18 +90,14 @@ def follow(
             nonlocal evaluations
             evaluations += 1
             state = np.array(q, float), np.array(qd, float)
-            if not (np.isfinite(state[0]).all() and np.isfinite(state[1]).all()):
+            if not np.isfinite(np.concatenate(state)).all():
                 raise OverflowError
             tau = checked(model, torque, begun + next(stages) * dt, *state)
             if not is_plain:
-                return stepping.slope(model, q, qd, list(tau), dt, dynamics)
+                return stepping.slope(model, q, qd, list(tau), dt, COMPOSITE)
             try:
-                result = (
-                    evaluator.of_one(*state, tau)
-                    if evaluator
-                    else answered("acceleration", model, *state, tau)
-                )
-                return result.tolist()
+                of = evaluator.of_one if evaluator else lambda *x: answered("acceleration", model, *x)
+                return of(*state, tau).tolist()
             except (ValueError, AttributeError):  # not finite, or Mbar is singular
                 raise OverflowError from None
 

@@ -17,10 +17,7 @@ def com_positions(model: Tree, q: ArrayLike) -> np.ndarray:
     """Positions x_b of the centres of mass, in the inertial frame.
 
     Assignment, part b, equation (1); MuJoCo's xipos.
-
-    Returns
-    -------
-    (..., m, 3), m
+    Returns (..., m, 3), m.
 
     >>> print(tmt.com_positions(tmt.ARM, [0.0, 0.0, 0.0]) + 0.0)  # the upper arm hangs, the forearm points ahead
     [[ 0.    0.   -0.15]
@@ -34,10 +31,7 @@ def angular_velocities(model: Tree, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
     """Angular velocities omega_b = B_b qd, in body axes.
 
     Assignment, part d.
-
-    Returns
-    -------
-    (..., m, 3), rad/s
+    Returns (..., m, 3), rad/s.
 
     >>> print(tmt.angular_velocities(tmt.ARM, [0.0, 0.0, 0.0], [1.0, 0.0, 2.0]))  # both turn about y
     [[0. 1. 0.]
@@ -51,10 +45,7 @@ def jacobians(model: Tree, q: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """T_b = dx_b/dq in the inertial frame, and B_b with omega_b = B_b qd in body axes.
 
     Assignment, parts d and e; MuJoCo's mj_jacBodyCom, of B_b turned into the body.
-
-    Returns
-    -------
-    T, B : (..., m, 3, nv), m/rad and 1; columns of slides 1 and 0
+    Returns T, B : (..., m, 3, nv), m/rad and 1; columns of slides 1 and 0.
 
     >>> T, B = tmt.jacobians(tmt.ARM, [0.0, 0.0, 0.0])
     >>> print(T[1, :, 2], B[1, :, 2])  # gamma lowers the forearm, 0.15 m ahead of the elbow
@@ -69,10 +60,7 @@ def convective_terms(model: Tree, q: ArrayLike, qd: ArrayLike) -> tuple[np.ndarr
 
     What the centre of mass and the angular velocity of a body accelerate by at qdd = 0; h_b and g_b in the
     assignment, part e.
-
-    Returns
-    -------
-    v_conv, w_conv : (..., m, 3), m/s2 and rad/s2
+    Returns v_conv, w_conv : (..., m, 3), m/s2 and rad/s2.
 
     >>> v_conv, w_conv = tmt.convective_terms(tmt.ARM, [0.0, 0.0, 0.0], [0.0, 0.0, 2.0])
     >>> print(v_conv[1])  # towards the elbow: 0.15 m times (2 rad/s)^2
@@ -86,10 +74,7 @@ def com(model: Tree, q: ArrayLike) -> np.ndarray:
     """Position of the centre of mass of all bodies, in the inertial frame.
 
     sum_b m_b x_b / sum_b m_b; MuJoCo's subtree_com of the world.
-
-    Returns
-    -------
-    (..., 3), m
+    Returns (..., 3), m.
 
     >>> print(tmt.com(tmt.ARM, [0.0, 0.0, np.pi / 2]).round(9)[2])  # -(1.9 0.15 + 1.5 (0.3 + 0.15)) / 3.4
     -0.282352941
@@ -102,10 +87,7 @@ def com_jacobian(model: Tree, q: ArrayLike) -> np.ndarray:
     """Jacobian of `com`: its velocity for unit speeds, in the inertial frame.
 
     sum_b m_b T_b / sum_b m_b; MuJoCo's mj_jacSubtreeCom of the world.
-
-    Returns
-    -------
-    (..., 3, nv), m/rad; columns of slides 1
+    Returns (..., 3, nv), m/rad; columns of slides 1.
 
     >>> print(tmt.com_jacobian(tmt.ARM, [0.0, 0.0, 0.0])[2, 2].round(9))  # -1.5 0.15 / 3.4
     -0.066176471
@@ -119,10 +101,7 @@ def centroidal_momentum_matrix(model: Tree, q: ArrayLike) -> np.ndarray:
 
     Rows 0 to 2 are the linear momentum, the mass times `com_jacobian`; rows 3 to 5 the angular one,
     sum_b m_b (x_b - c) x T_b + R_b I_b B_b: MuJoCo's mj_angmomMat.
-
-    Returns
-    -------
-    (..., 6, nv), kg m/rad and kg m2/rad; columns of slides kg and kg m
+    Returns (..., 6, nv), kg m/rad and kg m2/rad; columns of slides kg and kg m.
 
     >>> A = tmt.centroidal_momentum_matrix(tmt.ARM, [0.0, 0.0, 0.0])
     >>> print(A[:3, 2].round(9))  # -1.5 0.15

@@ -32,10 +32,7 @@ def derivatives(model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Der
     turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
     three slides and a ball, by the position of its origin in the inertial frame, then by turns in its own
     axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so.
-
-    Returns
-    -------
-    Derivatives of five arrays (..., nv, nv), the derivative of row i by column j
+    Returns Derivatives of five arrays (..., nv, nv), the derivative of row i by column j.
 
     >>> q, rest = np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)
     >>> by = tmt.derivatives(tmt.ARM, q, rest, rest)  # the arm hangs

@@ -17,8 +17,6 @@ from tmt.model import singular
 from tmt.model.tree import Tree, checked_model
 from tmt.model.values import states
 
-# for which Mbar must be regular; step_derivatives: where the method takes nothing implicitly
-SOLVED = ("acceleration", "inverse_mass_matrix", "derivatives", "step_derivatives")
 BEYOND = "the result is beyond the largest double; smaller numbers in the state or model are expected"
 
 
@@ -51,7 +49,7 @@ def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
     batch = checked[0].shape[:-1]
     scalars = {key: list(np.moveaxis(array, -1, 0)) for key, array in zip(arrays, checked)}
     state = State(tree, scalars, name=argument_of(name))
-    if is_solved(name) and not tree.never_singular:
+    if quantity.solves and not tree.never_singular:
         matrix = state.mass_matrix
         if isinstance(stepping := METHODS.get(argument_of(name)), SemiImplicitEuler):
             implicit = stepping.implicit(tree, list(state.qd), scalars["dt"][0])
@@ -75,10 +73,6 @@ def step_derivatives(
     if not np.isfinite(values).all():
         raise ValueError(BEYOND)
     return values
-
-
-def is_solved(name: str) -> bool:
-    return name.partition(":")[0] in SOLVED
 
 
 def check_regular(tree: Tree, q: Values, matrix: Rows, batch: tuple[int, ...]) -> None:

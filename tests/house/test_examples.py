@@ -87,7 +87,7 @@ def test_the_notebook_has_the_cells_of_its_source():
         assert "".join(cell["source"]) == text.strip("\n") and (cell["cell_type"] == "markdown") == is_text
 
 
-SECTION = re.compile(r"(?ms)^ *(?:Parameters|Attributes)\n *-+\n(.*?)(?=\n *\n *\w+\n *-+\n|\Z)")
+SECTION = re.compile(r"(?ms)^ *(?:Parameters|Attributes)\n *-+\n(.*?)(?=\n *\n *(?:\w+\n *-+\n|>>>)|\Z)")
 FUNCTIONS = [getattr(tmt, name) for name in tmt.__all__ if inspect.isroutine(getattr(tmt, name))]
 OTHERS = [tmt.Tree, tmt.Tree.lock, tmt.Tree.from_joints, tmt.Motion, Difference]
 OTHERS += [getattr(compare, name) for name in compare.__all__]

@@ -44,7 +44,7 @@ def compiled(traced):
 @pytest.mark.parametrize("name, way", [("rk4", 1), ("implicit", 0), ("rk4", 2)])
 def test_the_derivative_of_a_slope_is_that_of_dual_numbers_in_the_literal_form(name, way, rng, monkeypatch):
     """In articulated bodies, where that can be, and by Mbar and h."""
-    monkeypatch.setattr(forms, "all_dynamics", lambda tree, ways=forms.all_dynamics: [ways(tree)[way]])
+    monkeypatch.setattr(forms, "forms_of", lambda tree, ways=forms.forms_of: [ways(tree)[way]])
     stepping, (q, qd, tau), dt = METHODS[name], random_state(rng, SMALL), 0.05
     start, direction = [*q.tolist(), *qd.tolist()], rng.uniform(-1, 1, len(q) + len(qd))
     found = compiled(forms.directional(SMALL, stepping))([*start, *tau, dt, *direction])

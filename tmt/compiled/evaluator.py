@@ -37,10 +37,11 @@ class Evaluator:
         if not is_quantity(quantity):
             raise ValueError(f"quantity is {shown(quantity)}; {what_is_known(quantity)}")
         self.tree, self.quantity = tree, quantity
-        self.sizes = tree.coordinates.nq, tree.coordinates.nv, tree.coordinates.nv, 1
+        self.shapes = [(tree.nq,), (tree.nv,), (tree.nv,), (1,)]
         self.shape, self.has_parts = shape_of(quantity, tree), bool(quantity_of(quantity).parts)
         self.size = math.prod(self.shape)
-        self.rest = [bytes(8 * size) for size in self.sizes]  # at rest, without torque
+        self.rest = [bytes(8 * size) for (size,) in self.shapes]  # at rest, without torque
+        self.may_be_singular = quantity_of(quantity).solves and not tree.never_singular
         self.local = threading.local()
         self.loops: dict[bool, Callable[..., int]] = {}
 
@@ -90,8 +91,7 @@ class Evaluator:
 
     def of_rows(self, q: np.ndarray, *rates: np.ndarray) -> np.ndarray | None:
         """The quantity of rows of states, (N, size); of rates one row may stand for all. None as above."""
-        count, n = len(q), len(self.tree.axis)
-        arrays = [q, *rates]
+        count, arrays = len(q), [q, *rates]
         out = np.empty((count, self.size))
         wide = count > WIDE or True in self.loops
         self.loop(wide)  # is compiled once, before any thread asks for it
@@ -99,12 +99,12 @@ class Evaluator:
         def fill(part: slice) -> bool:
             return self.fill(wide, out[part], *(x if len(x) == 1 else x[part] for x in arrays))
 
-        threads = max(1, min(cores(), count * n // SHARED))
+        threads = max(1, min(cores(), count * self.tree.nv // SHARED))
         return out if all(in_threads(fill, count, threads, TOGETHER, threads)) else None
 
     def fill(self, wide: bool, out: np.ndarray, *arrays: np.ndarray) -> bool:
         """Fill rows out (N, size) in one thread, of N rows or of one for all; False: some are wrong."""
-        arrays = (*arrays, *[np.zeros((1, size)) for size in self.sizes[len(arrays) :]])
+        arrays = (*arrays, *[np.zeros((1, *shape)) for shape in self.shapes[len(arrays) :]])
         steps = [0 if len(array) == 1 else array.shape[1] for array in arrays]
         return self.loop(wide)(*(x.ctypes.data for x in (*arrays, out)), len(out), *steps) == 0
 

@@ -6,84 +6,51 @@ paths, and the accelerations of large trees, are shorter in the axes of the worl
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import lru_cache, partial
-from typing import TypeVar
 
-from tmt.derivation import articulated, composite, linearized
 from tmt.derivation.dual import seeded
-from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.method import reduced_force
-from tmt.derivation.quantities import Form, State, Step, argument_of, quantity_of
-from tmt.derivation.vectors import Rows, Scalar, Values, minus, plus
+from tmt.derivation.form import ARTICULATED, BY_BODIES, COMPOSITE, Form
+from tmt.derivation.mechanism import Mechanism
+from tmt.derivation.quantities import State, Step, argument_of, quantity_of
+from tmt.derivation.vectors import Rows, Scalar, Values
 from tmt.methods import Linearized, method_named, one_step
-from tmt.methods.stepping import Dynamics, Implicit, Method
+from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
 
 from .straight import Traced, trace
 from .trace import Expression
 
-Way = TypeVar("Way")
 MANY = 20  # speeds from which derivatives are not traced by dual numbers
 DENSE = 10  # speeds up to which systems are solved in straight lines, dh/dqd is by dual numbers
-FORMS = (
-    Form(composite.mass_matrix_and_bias, composite.generalized_force),
-    Form(articulated.mass_matrix_and_bias, articulated.generalized_force, linearized.rates),
-)
-LONG_FORMS = (*FORMS[1:], FORMS[0]._replace(rates=linearized.rates))  # of derivatives
+FORMS = COMPOSITE, ARTICULATED, BY_BODIES
+TreeOf = Callable[[Sequence[Values]], Mechanism]
 
 
-def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], ways: Iterable[Way]) -> Traced:
-    return min((trace(name, sizes, partial(way, w)) for w in ways), key=lambda traced: traced.length)
+def shortest(name: str, sizes: Sequence[int], way: Callable[..., Values], forms: Iterable[Form]) -> Traced:
+    return min((trace(name, sizes, partial(way, form)) for form in forms), key=lambda traced: traced.length)
 
 
-class Traceable(Dynamics):
-    """Mbar and h of a form, for traced functions.
-
-    Of more than a few speeds the derivatives of h are in closed form, and linear systems solved by a call.
-    by_bodies: by articulated bodies, where all that a method takes implicitly acts at single joints.
-    """
-
-    def __init__(self, tree: AnyTree, form: Form, by_bodies: bool = False):
-        self.n, self.by_bodies = len(tree.axis), by_bodies
-        super().__init__(form._replace(rates=linearized.rates if self.n > DENSE else None))
-
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
-        if not self.by_bodies or (implicit and not implicit.acts_at_single_joints):
-            return super().acceleration(tree, q, qd, tau, implicit)
-        force, armature = reduced_force(tree, [0.0] * self.n, q, qd, tau), list(tree.armature)
-        if implicit:
-            force = minus(force, implicit.force)
-            armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
-        return articulated.acceleration(tree, q, qd, force, armature)
-
-    def solve_any(self, matrix: Rows, right: Values) -> Values:
-        if self.n <= DENSE:
-            return super().solve_any(matrix, right)
-        tape = next(x.tape for x in (*right, matrix[0][0]) if isinstance(x, Expression))
-        return tape.call("solution", [*(x for row in matrix for x in row), *right], self.n)
+def forms_of(tree: Tree) -> list[Form]:
+    """FORMS for accelerations; of more than a few speeds linear systems are solved by a call."""
+    if tree.nv <= DENSE:
+        return [replace(form, rates=None) for form in FORMS]
+    return [replace(form, solve_any=solved_by_call) for form in FORMS]
 
 
-def all_dynamics(tree: AnyTree) -> list[Traceable]:
-    """The ways to the accelerations of a tree: by Mbar and h in each form, and by articulated bodies."""
-    return [*(Traceable(tree, form) for form in FORMS), Traceable(tree, FORMS[-1], by_bodies=True)]
+def solved_by_call(matrix: Rows, right: Values) -> Values:
+    tape = next(x.tape for x in (*right, matrix[0][0]) if isinstance(x, Expression))
+    return tape.call("solution", [*(x for row in matrix for x in row), *right], len(right))
 
 
 @lru_cache(maxsize=64)
-def dynamics_for(tree: Tree) -> list[Traceable]:
-    """The ways that are traced for slopes; of a large tree the shortest to its accelerations."""
-    nq, n, every = tree.coordinates.nq, len(tree.axis), all_dynamics(tree)
-    if n <= DENSE:
-        return every
-
-    def length(dynamics: Dynamics) -> float:
-        return trace("acceleration", (nq, n, n), partial(dynamics.acceleration, tree)).length
-
-    return [min(every, key=length)]
-
-
-TreeOf = Callable[[Sequence[Values]], AnyTree]
+def forms_of_slopes(tree: Tree) -> list[Form]:
+    """Of a large tree that with the shortest accelerations alone."""
+    forms = forms_of(tree)
+    if tree.nv <= DENSE:
+        return forms
+    sizes = tree.nq, tree.nv, tree.nv
+    return [min(forms, key=lambda form: trace("slope", sizes, partial(form.acceleration, tree)).length)]
 
 
 def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | None = None) -> Traced:
@@ -91,33 +58,28 @@ def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | 
 
     more: the sizes of further arrays, from which tree_of makes the tree.
     """
-    row, nq, n = quantity_of(name), tree.coordinates.nq, len(tree.axis)
-    sizes = nq, n, n, 1, *more
-
-    def model_of(arrays: Sequence[Values]) -> AnyTree:
-        return tree_of(arrays[4:]) if tree_of else tree
+    row = quantity_of(name)
 
     def in_form(form: Form, *arrays: Values) -> Values:
-        return values_in(form, model_of(arrays), name, dict(zip(row.takes, arrays)))
+        mechanism = tree_of(arrays[4:]) if tree_of else tree
+        return values_in(form, mechanism, name, dict(zip(row.takes, arrays)))
 
-    def by_dynamics(dynamics: Dynamics, *arrays: Values) -> Values:
-        q, qd, tau, *_ = arrays
-        return dynamics.acceleration(model_of(arrays), q, qd, tau)
-
+    forms: Sequence[Form] = FORMS[:2] if row.has_forms else FORMS[:1]
     if name == "acceleration":
-        return shortest("quantity", sizes, by_dynamics, all_dynamics(tree))
-    some = (*FORMS[: n < MANY], *LONG_FORMS) if row.is_long else FORMS  # the first by dual numbers
-    return shortest("quantity", sizes, in_form, some if row.has_forms else some[:1])
+        forms = forms_of(tree)
+    elif row.is_long and row.has_forms:
+        forms = [*[replace(COMPOSITE, rates=None)][: tree.nv < MANY], *forms]
+    return shortest("quantity", (tree.nq, tree.nv, tree.nv, 1, *more), in_form, forms)
 
 
-def values_in(form: Form, tree: AnyTree, name: str, arrays: Mapping[str, Values]) -> Values:
+def values_in(form: Form, tree: Mechanism, name: str, arrays: Mapping[str, Values]) -> Values:
     """The numbers of a quantity, by its full name, of a state in arrays by name, flat."""
     row, argument = quantity_of(name), argument_of(name)
     step = straight_step(tree, argument, form) if row.argument == "method" else None
     return flat(row.of(State(tree, arrays, form, argument, step)))
 
 
-def straight_step(tree: AnyTree, name: str, form: Form) -> Step:
+def straight_step(tree: Mechanism, name: str, form: Form) -> Step:
     """A step of the method of that name without loops; ValueError of one that solves its stages."""
     stepping = method_named(name)
     if stepping.solves_stages:
@@ -131,23 +93,19 @@ def flat(nested: Scalar) -> Values:
 
 
 def slope(tree: Tree, stepping: Method) -> Traced:
+    def function(form: Form, q: Values, qd: Values, tau: Values, dt: Values) -> Values:
+        return stepping.slope(tree, q, qd, tau, dt[0], form)
 
-    def function(dynamics: Dynamics, q: Values, qd: Values, tau: Values, dt: Values) -> Values:
-        return stepping.slope(tree, q, qd, tau, dt[0], dynamics)
-
-    nq, n = tree.coordinates.nq, tree.coordinates.nv
-    return shortest("slope", (nq, n, n, 1), function, dynamics_for(tree))
+    return shortest("slope", (tree.nq, tree.nv, tree.nv, 1), function, forms_of_slopes(tree))
 
 
 def directional(tree: Tree, stepping: Method) -> Traced:
-    nq, n = tree.coordinates.nq, tree.coordinates.nv
+    nq, nv = tree.nq, tree.nv
 
-    def both(
-        dynamics: Dynamics, q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values
-    ) -> Values:
+    def both(form: Form, q: Values, qd: Values, tau: Values, dt: Values, dq: Values, dqd: Values) -> Values:
         x = seeded([*q, *qd], [*dq, *dqd])
-        slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], dynamics)
+        slopes = stepping.slope(tree, x[:nq], x[nq:], tau, dt[0], form)
         parts = [x[0].parts(value) for value in slopes]
         return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
-    return shortest("directional", (nq, n, n, 1, nq, n), both, dynamics_for(tree))
+    return shortest("directional", (nq, nv, nv, 1, nq, nv), both, forms_of_slopes(tree))

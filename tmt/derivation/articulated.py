@@ -18,7 +18,7 @@ of Mbar with n times the length of the paths to the world.
 from typing import NamedTuple
 
 from .composite import Distribution, Round, rounded, turning
-from .mechanism import AnyTree, rotation_in_parent
+from .mechanism import Mechanism, rotation_in_parent
 from .method import with_diagonal, with_rotors
 from .vectors import IDENTITY, ZERO, Matrix, Record, Rows, Scalar, Scalars, Values, Vector, combined, outer
 
@@ -96,7 +96,7 @@ class Rigid(NamedTuple):
         return Carried(self.force, self.J, H, Symmetric(Vector(m, m, m), ZERO))
 
 
-def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()) -> Values:
+def acceleration(tree: Mechanism, q: Scalars, qd: Scalars, force: Scalars, armature: Scalars = ()) -> Values:
     """qdd (nv,) from Mbar qdd = force - h; force: all but the bias; armature: in place of the tree's."""
     frames, rigid = outward(tree, q, qd)
     armature = armature or tree.armature
@@ -127,7 +127,7 @@ def acceleration(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars, armatur
     return result
 
 
-def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
+def mass_matrix_and_bias(tree: Mechanism, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
     frames, own = outward(tree, q, qd)
     rigid, joints = gathered(tree, own), tree.coordinates.joints
     M: Rows = [[0.0] * len(qd) for _ in qd]
@@ -141,7 +141,7 @@ def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, 
     return with_diagonal(M, tree.armature), along_speeds(frames, rigid)
 
 
-def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
+def generalized_force(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
     frames, own = outward(tree, q, qd, qdd)
     return with_rotors(tree, along_speeds(frames, gathered(tree, own)), qdd)
 
@@ -150,7 +150,7 @@ def along_speeds(frames: list[Frame], rigid: list[Rigid]) -> Values:
     return [d.dot(body.force) for frame, body in zip(frames, rigid) for d in frame.directions]
 
 
-def gathered(tree: AnyTree, own: list[Record]) -> list[Record]:
+def gathered(tree: Mechanism, own: list[Record]) -> list[Record]:
     result = list(own)
     for i in reversed(range(len(result))):
         if tree.parent[i] >= 0:
@@ -159,7 +159,7 @@ def gathered(tree: AnyTree, own: list[Record]) -> list[Record]:
 
 
 def outward(
-    tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars = (), number: Round = float
+    tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars = (), number: Round = float
 ) -> tuple[list[Frame], list[Rigid]]:
     """The frames of all joints, and what each carries itself; qdd: (), none."""
     distributions = rounded(tree, number)[0]

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import mpmath
 
 from .coordinates import Joint
-from .mechanism import AnyTree, origin_in_parent, rotation_in_parent
+from .mechanism import Mechanism, origin_in_parent, rotation_in_parent
 from .method import with_diagonal, with_rotors
 from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, combined, outer, total_vector
 
@@ -101,7 +101,7 @@ def exact_vector(components: Scalars) -> Vector:
     return Vector(*map(fraction, components))
 
 
-def distribution_of(tree: AnyTree, body: int) -> Distribution:
+def distribution_of(tree: Mechanism, body: int) -> Distribution:
     """The distribution of a body about the origin of its joint's frame, in exact fractions: ten numbers."""
     inertia = Matrix(map(exact_vector, tree.inertia[body]))
     (xx, *_), (_, yy, _), (*_, zz) = inertia
@@ -112,7 +112,7 @@ def distribution_of(tree: AnyTree, body: int) -> Distribution:
     return about_com.moved(exact_vector(tree.com[body]))
 
 
-def carried_by_joint(tree: AnyTree) -> list[Distribution]:
+def carried_by_joint(tree: Mechanism) -> list[Distribution]:
     """The distribution that each joint carries itself, in exact fractions, as far inward as it can be handed.
 
     What lies on a hinge's axis (its mass, first moment and second moment along it) acts the same if it
@@ -145,11 +145,11 @@ class Motion(NamedTuple):
     P: Matrix
 
 
-def along_axes(tree: AnyTree, joint: Joint, rates: Scalars) -> Vector:
+def along_axes(tree: Mechanism, joint: Joint, rates: Scalars) -> Vector:
     return total_vector(Vector(*axis) * rate for axis, rate in zip(tree.axis[joint.qd], rates[joint.qd]))
 
 
-def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalars = ()) -> list[Motion]:
+def motions(tree: Mechanism, placements: list[Placement], qd: Scalars, qdd: Scalars = ()) -> list[Motion]:
     result: list[Motion] = []
     for i, (joint, (offset, rotation)) in enumerate(zip(tree.coordinates.joints, placements)):
         a, omega, omegad = Vector(*tree.gravity) * -1.0, ZERO, ZERO
@@ -170,7 +170,7 @@ def motions(tree: AnyTree, placements: list[Placement], qd: Scalars, qdd: Scalar
 
 
 def mass_matrix_and_bias(
-    tree: AnyTree, q: Scalars, qd: Scalars, number: Round = float
+    tree: Mechanism, q: Scalars, qd: Scalars, number: Round = float
 ) -> tuple[Rows, Values]:
     n, joints, placements = len(tree.axis), tree.coordinates.joints, placed(tree, q)
     axes = [Vector(*axis) for axis in tree.axis]
@@ -200,18 +200,20 @@ def mass_matrix_and_bias(
     return with_diagonal(M, tree.armature), h
 
 
-def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float) -> Values:
+def generalized_force(
+    tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float
+) -> Values:
     placements = placed(tree, q)
     own, moving = rounded(tree, number)[0], motions(tree, placements, qd, qdd)
     return with_rotors(tree, inward(tree, placements, moving, own), qdd)
 
 
-def placed(tree: AnyTree, q: Scalars) -> list[Placement]:
+def placed(tree: Mechanism, q: Scalars) -> list[Placement]:
     return [(origin_in_parent(tree, i, q), rotation_in_parent(tree, i, q)) for i in range(len(tree.parent))]
 
 
 def inward(
-    tree: AnyTree, placements: list[Placement], moving: list[Motion], own: list[Distribution]
+    tree: Mechanism, placements: list[Placement], moving: list[Motion], own: list[Distribution]
 ) -> Values:
     """Force and moment on all that each joint carries, along and about its axes, (nv,)."""
     result: Values = [0.0] * len(tree.axis)
@@ -229,14 +231,14 @@ def inward(
     return result
 
 
-def rounded(tree: AnyTree, number: Round) -> tuple[list[Distribution], ...]:
+def rounded(tree: Mechanism, number: Round) -> tuple[list[Distribution], ...]:
     """As rounded_once, which holds floats alone: other numbers may have other digits in another call."""
     parts = rounded_once if number is float and isinstance(tree, Hashable) else rounded_once.__wrapped__
     return parts(tree, number)
 
 
 @lru_cache(maxsize=64)
-def rounded_once(tree: AnyTree, number: Round) -> tuple[list[Distribution], ...]:
+def rounded_once(tree: Mechanism, number: Round) -> tuple[list[Distribution], ...]:
     """What each joint carries itself, its part that is not even about a hinge, and the part that is."""
     exact = carried_by_joint(tree)
     even = [NOTHING] * len(exact)

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 from .articulated import STILL, Frame, Rigid, Screw, gathered, outward
 from .composite import Round
-from .mechanism import AnyTree
+from .mechanism import Mechanism
 from .vectors import ZERO, Matrix, Rows, Scalars, Vector, combined, outer
 
 
@@ -53,7 +53,7 @@ def momentum(body: Rigid, omega: Vector, u: Vector) -> Momentum:
     return Momentum(K, u * body.m + omega.cross(body.s))
 
 
-def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
+def velocities(tree: Mechanism, frames: list[Frame], qd: Scalars) -> list[Screw]:
     result: list[Screw] = []
     for i, joint in enumerate(tree.coordinates.joints):
         v = result[tree.parent[i]] if tree.parent[i] >= 0 else STILL
@@ -62,7 +62,7 @@ def velocities(tree: AnyTree, frames: list[Frame], qd: Scalars) -> list[Screw]:
     return result
 
 
-def rates(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float) -> tuple[Rows, Rows]:
+def rates(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float) -> tuple[Rows, Rows]:
     """Derivatives of Mbar qdd + h by movements of q (of a ball turns in its axes) and qd, (nv, nv) each."""
     n, joints = len(qd), tree.coordinates.joints
     frames, own = outward(tree, q, qd, qdd, number)

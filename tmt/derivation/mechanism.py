@@ -4,54 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, NamedTuple, TypeVar
+from typing import NamedTuple
 
 from .coordinates import Coordinates, coordinates_of
 from .vectors import IDENTITY, Matrix, Scalar, Scalars, Vector, rotation, rotation_of
 
-Number = TypeVar("Number")
 UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 Names = tuple[str, ...]
 Indices = tuple[int, ...]
-Numbers = tuple[Number, ...]
-Rows = tuple[tuple[Number, ...], ...]
+Numbers = tuple[float, ...]
+Rows = tuple[Numbers, ...]
 
 
 @dataclass(frozen=True)
-class Mechanism(Generic[Number]):
+class Mechanism:
     """The fields of `tmt.Tree`, which says what they are, in any type of number and unchecked."""
 
     joint_names: Names
     parent: Indices
-    offset: Rows[Number]
-    axis: Rows[Number]
-    damping: Numbers[Number]
+    offset: Rows
+    axis: Rows
+    damping: Numbers
     body_names: Names
     body_joint: Indices
-    mass: Numbers[Number]
-    com: Rows[Number]
-    inertia: tuple[Rows[Number], ...]
-    gravity: Numbers[Number]
-    kind: Names = ()
-    armature: Numbers[Number] = ()
-    stiffness: Numbers[Number] = ()
-    rest: Numbers[Number] = ()
-    reference: Numbers[Number] = ()
-    position_gain: Rows[Number] = ()
-    speed_gain: Rows[Number] = ()
-    site_names: Names = ()
-    site_joint: Indices = ()
-    site_offset: Rows[Number] = ()
-    site_rotation: tuple[Rows[Number], ...] = ()
+    mass: Numbers
+    com: Rows
+    inertia: tuple[Rows, ...]
+    gravity: Numbers
+    kind: Names
+    armature: Numbers
+    stiffness: Numbers
+    rest: Numbers
+    reference: Numbers
+    position_gain: Rows
+    speed_gain: Rows
+    site_names: Names
+    site_joint: Indices
+    site_offset: Rows
+    site_rotation: tuple[Rows, ...]
 
     @property
     def coordinates(self) -> Coordinates:
         return coordinates_of(self.kind)
 
     @property
-    def zero(self) -> tuple[Number | float, ...]:
+    def zero(self) -> Numbers:
         """The reference position, (nq,): every frame is parallel to the inertial frame."""
-        position: tuple[Number | float, ...] = ()
+        position: Numbers = ()
         for kind, reference in zip(self.kind, self.reference):
             position += (1.0, 0.0, 0.0, 0.0) if kind == "ball" else (reference,)
         return position
@@ -92,10 +91,7 @@ class Site(NamedTuple):
     rotation: Sequence[Sequence[Scalar]]  # its axes as columns, in the frame of the joint
 
 
-AnyTree = Mechanism[Scalar]
-
-
-def origin_in_parent(tree: AnyTree, i: int, q: Scalars) -> Vector:
+def origin_in_parent(tree: Mechanism, i: int, q: Scalars) -> Vector:
     """Origin of joint i's frame in its parent's, at the position q of the tree (nq,)."""
     joint, offset = tree.coordinates.joints[i], Vector(*tree.offset[i])
     if joint.kind != "slide":
@@ -103,7 +99,7 @@ def origin_in_parent(tree: AnyTree, i: int, q: Scalars) -> Vector:
     return offset + Vector(*tree.axis[joint.qd.start]) * (q[joint.q.start] - tree.reference[i])
 
 
-def rotation_in_parent(tree: AnyTree, i: int, q: Scalars) -> Matrix:
+def rotation_in_parent(tree: Mechanism, i: int, q: Scalars) -> Matrix:
     """Turn of joint i's frame in its parent's, which takes components in it to those in the parent's."""
     joint = tree.coordinates.joints[i]
     if joint.kind == "slide":

@@ -24,7 +24,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from .dual import jacobian
-from .mechanism import AnyTree, origin_in_parent, rotation_in_parent
+from .mechanism import Mechanism, origin_in_parent, rotation_in_parent
 from .vectors import (
     IDENTITY,
     ZERO,
@@ -42,7 +42,7 @@ from .vectors import (
     weighted,
 )
 
-Terms = Callable[[AnyTree, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
+Terms = Callable[[Mechanism, Scalars, Scalars], tuple[Rows, Values]]  # Mbar and h
 
 
 class Frame(NamedTuple):
@@ -84,7 +84,7 @@ class Placed(NamedTuple):
 WORLD = Frame(ZERO, IDENTITY, [], False, ZERO, ZERO, ZERO)
 
 
-def joint_frames(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Frame]:
+def joint_frames(tree: Mechanism, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Frame]:
     """The n joints' frames at positions q (rad, m) and speeds qd (per s, default at rest), walked outward.
 
     With qdd (per s2) origin_conv and omega_conv are the accelerations themselves.
@@ -119,7 +119,7 @@ def carried(frame: Frame, point: Vector) -> tuple[Vector, Vector]:
     return frame.origin + r, frame.origin_conv + turning
 
 
-def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Body]:
+def bodies(tree: Mechanism, q: Scalars, qd: Scalars | None = None, qdd: Scalars = ()) -> list[Body]:
     """T_b, B_b and the convective terms of every body, at positions q and speeds qd (default at rest).
 
     With qdd v_conv and w_conv are the accelerations themselves: the bias of such bodies is Mbar qdd + h
@@ -139,7 +139,7 @@ def bodies(tree: AnyTree, q: Scalars, qd: Scalars | None = None, qdd: Scalars = 
 
 
 def columns(
-    tree: AnyTree, frames: Sequence[Frame], joint: int, point: Vector, to_body: Matrix
+    tree: Mechanism, frames: Sequence[Frame], joint: int, point: Vector, to_body: Matrix
 ) -> list[tuple[Vector, Vector]]:
     """Frame.column of each speed (nv,), zero where it does not move what is fixed to a joint."""
     path, result = tree.path(joint), list[tuple[Vector, Vector]]()
@@ -148,7 +148,7 @@ def columns(
     return result
 
 
-def placed_frame(tree: AnyTree, name: str, q: Scalars, qd: Scalars | None = None) -> Placed:
+def placed_frame(tree: Mechanism, name: str, q: Scalars, qd: Scalars | None = None) -> Placed:
     """The site or body of that name of a tree; of a body the frame of its joint."""
     frames, site = joint_frames(tree, q, qd), tree.site_of(name)
     carrier = frames[site.joint] if site.joint >= 0 else WORLD
@@ -185,43 +185,43 @@ def bias(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Values:
     return h
 
 
-def mass_matrix_and_bias(tree: AnyTree, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
+def mass_matrix_and_bias(tree: Mechanism, q: Scalars, qd: Scalars) -> tuple[Rows, Values]:
     parts = bodies(tree, q, qd)
     return mass_matrix(parts, tree.armature), bias(parts, tree.gravity)
 
 
-def generalized_force(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
+def generalized_force(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars) -> Values:
     return with_rotors(tree, bias(bodies(tree, q, qd, qdd), tree.gravity), qdd)
 
 
-def with_rotors(tree: AnyTree, force: Scalars, qdd: Scalars) -> Values:
+def with_rotors(tree: Mechanism, force: Scalars, qdd: Scalars) -> Values:
     return [f + rotor * a if rotor else f for f, rotor, a in zip(force, tree.armature, qdd)]
 
 
-def inverse_dynamics(tree: AnyTree, q: Scalars, qd: Scalars, force: Scalars) -> Values:
+def inverse_dynamics(tree: Mechanism, q: Scalars, qd: Scalars, force: Scalars) -> Values:
     """tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd (nv, N m), from force = Mbar qdd + h."""
     return [x * -1.0 for x in reduced_force(tree, force, q, qd, [0.0] * len(qd))]
 
 
-def bias_rates(tree: AnyTree, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias) -> Rows:
+def bias_rates(tree: Mechanism, q: Scalars, qd: Scalars, terms: Terms = mass_matrix_and_bias) -> Rows:
     """dh/dqd (nv rows of nv, N m s/rad): the exact derivative of the bias by the speeds, by dual numbers."""
     return jacobian(lambda rates: terms(tree, q, rates)[1], qd)
 
 
-def from_rest(tree: AnyTree, q: Scalars) -> list[tuple[Scalar, Scalar]]:
+def from_rest(tree: Mechanism, q: Scalars) -> list[tuple[Scalar, Scalar]]:
     movement = tree.coordinates.difference(q, tree.rest)
     joints = zip(tree.stiffness, tree.coordinates.joints)
     return [(stiffness, movement[k]) for stiffness, joint in joints for k in joint.speeds]
 
 
-def spring_torque(tree: AnyTree, q: Scalars) -> Values:
+def spring_torque(tree: Mechanism, q: Scalars) -> Values:
     """k (q - rest) (nv, N m or N), which springs take off; of a ball k times the movement from its rest."""
     if not tree.has_springs:
         return [0.0] * len(tree.axis)
     return [stiffness * x for stiffness, x in from_rest(tree, q)]
 
 
-def fed_back(tree: AnyTree, q: Scalars, qd: Scalars) -> Values:
+def fed_back(tree: Mechanism, q: Scalars, qd: Scalars) -> Values:
     """P q + S qd (nv, N m or N), which a linear controller takes off; no entry of P is that of a ball."""
     positions = [q[i] for i in tree.coordinates.first_positions]
     result = [0.0] * len(qd)
@@ -238,7 +238,7 @@ def with_diagonal(matrix: Sequence[Scalars], diagonal: Scalars) -> Rows:
     return rows
 
 
-def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> Values:
+def reduced_force(tree: Mechanism, h: Scalars, q: Scalars, qd: Scalars, tau: Scalars) -> Values:
     """Qbar = tau - D qd - k (q - rest) - P q - S qd - h (nv, N m)."""
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
     if tree.has_springs:
@@ -249,7 +249,7 @@ def reduced_force(tree: AnyTree, h: Scalars, q: Scalars, qd: Scalars, tau: Scala
 
 
 def acceleration(
-    tree: AnyTree, q: Scalars, qd: Scalars, tau: Scalars, terms: Terms = mass_matrix_and_bias
+    tree: Mechanism, q: Scalars, qd: Scalars, tau: Scalars, terms: Terms = mass_matrix_and_bias
 ) -> Values:
     """qdd (nv, rad/s2) from Mbar qdd = Qbar, see the head of this file."""
     M, h = terms(tree, q, qd)
@@ -261,7 +261,7 @@ def potential(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Scalar:
     return total(b.mass * (Vector(*gravity) * -1.0).dot(b.x) for b in parts)
 
 
-def spring_energy(tree: AnyTree, q: Scalars) -> Scalar:
+def spring_energy(tree: Mechanism, q: Scalars) -> Scalar:
     if not tree.has_springs:
         return 0.0
     return total(0.5 * stiffness * (x * x) for stiffness, x in from_rest(tree, q) if stiffness)

@@ -9,23 +9,12 @@ from typing import Any, NamedTuple
 
 from . import method, whole
 from .dual import jacobian, unit_vectors
-from .mechanism import AnyTree
+from .form import LITERAL, Form, Rates
+from .mechanism import Mechanism
 from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values, added
 
 # (q, qd, tau, dt): q, qd one dt later
 Step = Callable[[Values, Values, Values, Scalar], tuple[Values, Values]]
-Rates = tuple[Rows, Rows]  # by movements and by speeds
-
-
-class Form(NamedTuple):
-    """Mbar and h, and Mbar qdd + h, as sums in one order; the rates of the latter, None: by dual numbers."""
-
-    terms: Callable[..., tuple[Rows, Values]]
-    generalized_force: Callable[..., Values]
-    rates: Callable[..., Rates] | None = None
-
-
-LITERAL = Form(method.mass_matrix_and_bias, method.generalized_force)
 
 
 class State:
@@ -36,7 +25,7 @@ class State:
     """
 
     def __init__(
-        self, tree: AnyTree, given: Mapping[str, Scalars], form: Form = LITERAL, name: str = "",
+        self, tree: Mechanism, given: Mapping[str, Scalars], form: Form = LITERAL, name: str = "",
         step: Step | None = None,
     ):  # fmt: skip
         nothing = [0.0] * len(tree.axis)
@@ -73,8 +62,7 @@ class State:
 
     @property
     def acceleration(self) -> Values:
-        Qbar = method.reduced_force(self.tree, self.bias, self.q, self.qd, self.tau)
-        return self.factors.solve(Qbar)
+        return self.form.acceleration(self.tree, list(self.q), list(self.qd), list(self.tau))
 
     @cached_property
     def qdd(self) -> Values:
@@ -117,11 +105,7 @@ class State:
 
     @property
     def coriolis_matrix(self) -> Rows:
-        nothing = [0.0] * len(self.qd)
-        if self.form.rates is None:
-            rates = method.bias_rates(self.tree, self.q, self.qd, self.form.terms)
-        else:
-            rates = self.form.rates(self.tree, self.q, self.qd, nothing)[1]
+        rates = self.form.bias_rates(self.tree, list(self.q), list(self.qd))
         return whole.coriolis_matrix(self.tree, self.qd, self.mass_matrix, rates)
 
     @property
@@ -163,6 +147,7 @@ class Quantity(NamedTuple):
     # what its full name says after a colon (frame_pose:hand, step_derivatives:rk4): a frame or a method
     argument: str = ""
     is_long: bool = False  # it has many operations: it is compiled only where it is asked for by name
+    solves: bool = False  # Mbar must be regular; of a step: where its method takes nothing implicitly
     has_forms: bool = True  # it follows from Mbar or h, whose sums have several orders
     title: str = ""  # what it is, where no public function of its name says so
 
@@ -185,21 +170,19 @@ QUANTITIES = {
         ("v_conv", "w_conv"), has_forms=False,
     ),
     "mass_matrix": Quantity(Q, ("nv", "nv"), "kg m2", lambda s: s.mass_matrix),
-    "inverse_mass_matrix": Quantity(Q, ("nv", "nv"), "1/(kg m2)", lambda s: s.factors.inverted()),
+    "inverse_mass_matrix": Quantity(Q, ("nv", "nv"), "1/(kg m2)", lambda s: s.factors.inverted(), solves=True),
     "bias": Quantity(QD, ("nv",), "N m", lambda s: s.bias),
     "gravity_balance": Quantity(Q, ("nv",), "N m", lambda s: s.gravity_balance),
     "spring_torque": Quantity(
         Q, ("nv",), "N m", lambda s: method.spring_torque(s.tree, s.q), has_forms=False
     ),
-    "acceleration": Quantity(TAU, ("nv",), "rad/s2", lambda s: s.acceleration),
+    "acceleration": Quantity(TAU, ("nv",), "rad/s2", lambda s: s.acceleration, solves=True),
     "inverse_dynamics": Quantity(QDD, ("nv",), "N m", lambda s: s.inverse_dynamics),
-    "derivatives": Quantity(TAU, (5, "nv", "nv"), "SI", lambda s: s.derivatives, BY_STATE, is_long=True),
+    "derivatives": Quantity(TAU, (5, "nv", "nv"), "SI", lambda s: s.derivatives, BY_STATE, is_long=True, solves=True),
     "inverse_dynamics_derivatives": Quantity(
         QDD, (2, "nv", "nv"), "N m/rad; N m s/rad", lambda s: list(s.torque_rates), BY_STATE[3:], is_long=True
     ),
-    "coriolis_matrix": Quantity(
-        QD, ("nv", "nv"), "N m s/rad", lambda s: s.coriolis_matrix, is_long=True
-    ),
+    "coriolis_matrix": Quantity(QD, ("nv", "nv"), "N m s/rad", lambda s: s.coriolis_matrix, is_long=True),
     "com": Quantity(Q, (3,), "m", lambda s: list(whole.centre_of_mass(s.bodies)[0]), has_forms=False),
     "com_jacobian": Quantity(
         Q, (3, "nv"), "m/rad", lambda s: whole.centre_of_mass(s.bodies)[1], has_forms=False
@@ -225,7 +208,7 @@ QUANTITIES = {
         title="Accelerations of a frame at qdd = 0, of its origin and angular, inertial frame, shape (6,).",
     ),
     "step_derivatives": Quantity(
-        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True,
+        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True, solves=True,
         title="[A B] (2 nv, 3 nv) of one step, A = dx+/dx beside B = dx+/dtau, x = (movement, qd), dt in s.",
     ),
 }  # fmt: skip
@@ -252,7 +235,7 @@ def argument_of(name: str) -> str:
     return name.partition(":")[2]
 
 
-def shape_of(name: str, tree: AnyTree) -> tuple[int, ...]:
+def shape_of(name: str, tree: Mechanism) -> tuple[int, ...]:
     n = len(tree.axis)
     sizes = {"m": len(tree.mass), "10m": 10 * len(tree.mass), "nv": n, "2nv": 2 * n, "3nv": 3 * n}
     return tuple(size if isinstance(size, int) else sizes[size] for size in quantity_of(name).shape)

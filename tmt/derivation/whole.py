@@ -6,12 +6,12 @@ Mbar qdd + h = Y theta is linear in the ten inertial numbers of each body, and t
 from collections.abc import Sequence
 from itertools import combinations
 
-from .mechanism import AnyTree
+from .mechanism import Mechanism
 from .method import WORLD, Body, columns, joint_frames, with_diagonal
 from .vectors import IDENTITY, ZERO, Rows, Scalars, Vector, outer, total
 
 
-def coriolis_matrix(tree: AnyTree, qd: Scalars, M: Sequence[Scalars], rates: Sequence[Scalars]) -> Rows:
+def coriolis_matrix(tree: Mechanism, qd: Scalars, M: Sequence[Scalars], rates: Sequence[Scalars]) -> Rows:
     """C (nv rows of nv, N m s/rad) of Christoffel symbols, from M = Mbar and rates = dh/dqd.
 
     C = (dh/dqd + Mbar A) / 2, where A u is the bracket of the speeds qd and u: omega x u of a ball, whose speeds are
@@ -51,7 +51,7 @@ def centroidal_momentum(parts: Sequence[Body]) -> Rows:
     return [list(row) for row in zip(*result)]
 
 
-def regressor(tree: AnyTree, q: Scalars, qd: Scalars, qdd: Scalars) -> Rows:
+def regressor(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars) -> Rows:
     """Y (nv rows of 10 m): Y theta is the part of Mbar qdd + h that the bodies have, without the armature.
 
     theta: of each body its mass m, first moment s and inertia J about the origin of its joint's frame, in its axes.

@@ -9,7 +9,8 @@ import numpy as np
 from tmt.compiled.forms import values_in
 from tmt.compiled.trace import Tape
 from tmt.derivation import composite, linearized
-from tmt.derivation.quantities import Form, quantity_of, shape_of
+from tmt.derivation.form import Form
+from tmt.derivation.quantities import quantity_of, shape_of
 from tmt.exact import series
 from tmt.exact.motion import DIGITS, FORMS, Equations, program
 from tmt.exact.tree import exact_tree

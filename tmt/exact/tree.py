@@ -3,14 +3,14 @@
 from collections.abc import Callable, Iterable
 
 from tmt.derivation.coordinates import Coordinates, normalized
-from tmt.derivation.mechanism import AnyTree, Mechanism
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import Scalar, Vector, sqrt
 from tmt.model.tree import Tree
 
 DIGITS = 50  # of computations that show that numbers are zero or that others are right
 
 
-def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> AnyTree:
+def exact_tree(tree: Tree, number: Callable[[float], Scalar]) -> Mechanism:
     """A Tree with each number made by `number` from its double; directions have length 1 in all digits.
 
     number: mpmath.mpf, or another type made from a double. Turns about an axis that is a little longer than 1

@@ -10,7 +10,7 @@ from typing import Any
 
 from tmt.compiled import forms
 from tmt.compiled.straight import Traced
-from tmt.derivation.mechanism import AnyTree
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.derivation.vectors import Values
 from tmt.model.tree import Tree, checked_model, stated
@@ -195,7 +195,7 @@ def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
     if parameters is None:
         return forms.quantity(model, name)
 
-    def tree_of(arrays: Sequence[Values]) -> AnyTree:
+    def tree_of(arrays: Sequence[Values]) -> Mechanism:
         return parameters.applied(model, dict(zip(parameters.values, arrays)))
 
     return forms.quantity(model, name, [len(value) for value in parameters.values.values()], tree_of)

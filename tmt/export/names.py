@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import sympy
 
-from tmt.derivation.mechanism import AnyTree, Mechanism
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import Scalar
 from tmt.model.tree import Tree
 
@@ -127,7 +127,7 @@ class Names:
     def is_exact(self) -> bool:
         return self.named and all(x in (-1, 0, 1) for axis in self.axes for x in axis)
 
-    def mechanism(self, scalar: Callable[[Expression], Scalar]) -> AnyTree:
+    def mechanism(self, scalar: Callable[[Expression], Scalar]) -> Mechanism:
         def lifted(values: Any) -> Any:
             return tuple(map(lifted, values)) if isinstance(values, list) else scalar(values)
 

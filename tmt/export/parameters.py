@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tmt.derivation.mechanism import AnyTree, Mechanism
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import Matrix, Values, Vector
 from tmt.model.tree import Tree
 
@@ -99,7 +99,7 @@ class Parameters:
         origin, axes = self.sites.get(name, (np.zeros(3), np.eye(3)))
         return Frame(np.array(origin, dtype=float), np.array(axes, dtype=float))
 
-    def applied(self, tree: Tree, values: Mapping[str, Values]) -> AnyTree:
+    def applied(self, tree: Tree, values: Mapping[str, Values]) -> Mechanism:
         numbers: dict[str, Any] = {field.name: getattr(tree, field.name) for field in fields(Mechanism)}
         bodies = {part: list(numbers[part]) for part in SIZES}
         if self.has_payload:

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.derivation import composite, linearized
 from tmt.derivation.dual import Dual, seeded, values_of
-from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.quantities import Form, State
+from tmt.derivation.form import COMPOSITE, LITERAL, Form, Implicit
+from tmt.derivation.mechanism import Mechanism
+from tmt.derivation.quantities import State
 from tmt.derivation.vectors import (
     Factors,
     Rows,
@@ -26,11 +26,10 @@ from tmt.derivation.vectors import (
     solve_any,
     total,
 )
-from tmt.methods.stepping import LITERAL, Dynamics, Implicit, Method
+from tmt.methods.stepping import Method
 from tmt.methods.stepping import State as Reached
 
 Array = np.ndarray
-COMPOSITE = Form(composite.mass_matrix_and_bias, composite.generalized_force, linearized.rates)
 FEW_SPEEDS = 4  # up to which dual numbers go through the solution of the linear system too
 PART = 4096  # states times speeds that are taken at once: more do not stay in the processor's cache
 
@@ -43,17 +42,17 @@ class Change(NamedTuple):
     solve: Callable[[Values], Values]  # the linear system
 
 
-class Linearized(Dynamics):
+class Linearized(Form):
     """Accelerations of dual numbers over any scalar, by the derivatives of the linear system."""
 
     def __init__(self, form: Form = COMPOSITE):
-        super().__init__(form)
+        super().__init__(**vars(form))
         self.last: Change  # of the state that was met last
         # dual numbers of traced scalars meet the same states once for each direction; i: of a scalar on the tape
         self.changes: dict[tuple[int, ...], Change] = {}
 
     def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
+        self, tree: Mechanism, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
     ) -> Values:
         plain_q, plain_qd, plain_tau = (values_of(part) for part in (q, qd, tau))
         plain = implicit._replace(force=values_of(implicit.force)) if implicit else None
@@ -71,9 +70,11 @@ class Linearized(Dynamics):
             right = minus(right, [dual.parts(x)[1] for x in implicit.force])
         return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
 
-    def change(self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None) -> Change:
+    def change(
+        self, tree: Mechanism, q: Values, qd: Values, tau: Values, implicit: Implicit | None
+    ) -> Change:
         a = super().acceleration(tree, q, qd, tau, implicit)
-        state = State(tree, {"q": q, "qd": qd, "qdd": a}, self.form)
+        state = State(tree, {"q": q, "qd": qd, "qdd": a}, self)
         matrix, (by_movement, by_speed) = state.mass_matrix, state.torque_rates
         if implicit:
             matrix = added(matrix, implicit.matrix)
@@ -85,12 +86,12 @@ class Linearized(Dynamics):
         return Change(a, by_movement, by_speed, matrix, partial(solve_any, matrix))
 
     def changes_of_bias(
-        self, tree: AnyTree, q: Values, qd: Values, a: Values, implicit: Implicit
+        self, tree: Mechanism, q: Values, qd: Values, a: Values, implicit: Implicit
     ) -> list[Rows]:
         """dt dh/dqd in the implicit rows, and the derivatives of dt dh/dqd a by movements and by speeds."""
         rest, half = [0.0] * len(qd), [0.5] * len(qd)
         ahead, behind = (
-            State(tree, {"q": q, "qd": speeds, "qdd": rest}, self.form).force_rates
+            State(tree, {"q": q, "qd": speeds, "qdd": rest}, self).force_rates
             for speeds in (plus(qd, a), minus(qd, a))
         )
         dts = [implicit.dt if i in implicit.bias_rows else 0.0 for i in range(len(qd))]
@@ -99,19 +100,19 @@ class Linearized(Dynamics):
 
 
 def one_step(
-    stepping: Method, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar,
-    dynamics: Dynamics = LITERAL,
+    stepping: Method, tree: Mechanism, q: Values, qd: Values, tau: Values, dt: Scalar,
+    form: Form = LITERAL,
 ) -> Reached:  # fmt: skip
     """The state (q, qd) of a tree one dt later by a method, over any scalar."""
 
     def slope(q: Values, qd: Values) -> Values:
-        return stepping.slope(tree, q, qd, tau, dt, dynamics)
+        return stepping.slope(tree, q, qd, tau, dt, form)
 
     return stepping.step(slope, q, qd, dt, tree.coordinates)
 
 
 def amplification(
-    stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: float | Array
+    stepping: Method, tree: Mechanism, q: Array, qd: Array, tau: Array, dt: float | Array
 ) -> Array:
     """The exact Jacobian of one step, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
 
@@ -123,7 +124,7 @@ def amplification(
 
 
 def transition(
-    stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: float | Array,
+    stepping: Method, tree: Mechanism, q: Array, qd: Array, tau: Array, dt: float | Array,
     by_torque: bool = True,
 ) -> Array:  # fmt: skip
     """The same by q, qd and tau (..., nv): (..., 2 nv, 3 nv) or, not by_torque, (..., 2 nv, 2 nv)."""
@@ -143,7 +144,7 @@ def transition(
 
 
 def jacobian_of_part(
-    stepping: Method, tree: AnyTree, q: Array, qd: Array, tau: Array, dt: Array, width: int
+    stepping: Method, tree: Mechanism, q: Array, qd: Array, tau: Array, dt: Array, width: int
 ) -> Array:
     """The same of a few states: q (states, nq), qd, tau (states, nv), dt (states,); width: of columns."""
     joints, nv, nq = tree.coordinates, qd.shape[1], q.shape[1]
@@ -153,9 +154,9 @@ def jacobian_of_part(
     state = [*seeded(start[: len(moved)], moved), *start[len(moved) :]]
     # the Jacobian of stages that are solved for is by dual numbers of dual numbers
     through_solution = nv <= FEW_SPEEDS or stepping.solves_stages
-    dynamics = Dynamics(COMPOSITE) if through_solution else Linearized()
+    form = COMPOSITE if through_solution else Linearized()
     torque = state[nq + nv :]
-    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq : nq + nv], torque, dt, dynamics)
+    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq : nq + nv], torque, dt, form)
     moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
     slopes = [np.broadcast_to(slope, (width, len(dt))) for slope in (*moved, *(x.slope for x in new_qd))]
     return np.array(slopes).transpose(2, 0, 1)

@@ -6,11 +6,12 @@ from functools import lru_cache
 from typing import TypeVar
 
 from tmt.derivation.coordinates import Coordinates
-from tmt.derivation.mechanism import AnyTree
+from tmt.derivation.form import LITERAL, Form, Implicit
+from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.method import with_diagonal
 from tmt.derivation.vectors import Scalar, Values, weighted
 
-from .stepping import LITERAL, Dynamics, Implicit, Method, Slope, State, advance, increments
+from .stepping import Method, Slope, State, advance, increments
 
 T = TypeVar("T")
 Gains = Sequence[Sequence[float]]
@@ -35,7 +36,7 @@ class SemiImplicitEuler(Method):
     implicit_springs: bool = False
     implicit_gains: bool = False
 
-    def entries_of_gains(self, tree: AnyTree) -> tuple[Gains, Gains]:
+    def entries_of_gains(self, tree: Mechanism) -> tuple[Gains, Gains]:
         """The implicit entries of the gains of position and of speed, (nv, nv) each; () for none."""
         if self.implicit_springs:
             return (tree.position_gain, tree.speed_gain)
@@ -44,14 +45,14 @@ class SemiImplicitEuler(Method):
         connected = zip(tree.speed_gain, on_one_path(tree))
         return (), tuple([gain if is_on else 0.0 for gain, is_on in zip(*rows)] for rows in connected)
 
-    def stiffness_and_damping(self, tree: AnyTree) -> tuple[Gains, Gains]:
+    def stiffness_and_damping(self, tree: Mechanism) -> tuple[Gains, Gains]:
         n = len(tree.axis)
         has_stiffness = self.implicit_springs and tree.has_springs
         stiffness = by_speed(tree, tree.stiffness) if has_stiffness else [0.0] * n
         position_gain, speed_gain = self.entries_of_gains(tree)
         return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
 
-    def implicit(self, tree: AnyTree, qd: Values, dt: Scalar) -> Implicit:
+    def implicit(self, tree: Mechanism, qd: Values, dt: Scalar) -> Implicit:
         (stiff, damped), powers, moved = self.stiffness_and_damping(tree), (dt, dt * dt), [dt * v for v in qd]
         matrix = [[weighted(entry, powers) for entry in zip(*rows)] for rows in zip(damped, stiff)]
         force = [weighted(row, moved) for row in stiff]
@@ -59,22 +60,22 @@ class SemiImplicitEuler(Method):
         return Implicit(matrix, force, dt, frozenset(range(len(qd))) if self.implicit_bias else alone)
 
     def slope(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
+        self, tree: Mechanism, q: Values, qd: Values, tau: Values, dt: Scalar, form: Form = LITERAL
     ) -> Values:
-        return dynamics.acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
+        return form.acceleration(tree, q, qd, tau, self.implicit(tree, qd, dt))
 
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:
         qd = advance(qd, dt, (1.0,), [slope(q, qd)])
         return joints.move(q, increments(dt, (1.0,), [qd], len(qd))), qd
 
 
-def by_speed(tree: AnyTree, of_joints: Iterable[T]) -> list[T]:
+def by_speed(tree: Mechanism, of_joints: Iterable[T]) -> list[T]:
     pairs = zip(of_joints, tree.coordinates.joints)
     return [value for value, joint in pairs for _ in joint.speeds]
 
 
 @lru_cache(maxsize=64)
-def on_one_path(tree: AnyTree) -> list[list[bool]]:
+def on_one_path(tree: Mechanism) -> list[list[bool]]:
     before = [{i} for i in range(len(tree.parent))]
     for i, parent in enumerate(tree.parent):
         before[i] |= before[parent] if parent >= 0 else set()
@@ -83,7 +84,7 @@ def on_one_path(tree: AnyTree) -> list[list[bool]]:
 
 
 @lru_cache(maxsize=64)
-def isolated_speeds(tree: AnyTree) -> frozenset[int]:
+def isolated_speeds(tree: Mechanism) -> frozenset[int]:
     """The speeds of free bodies (three slides and a ball from the world) that carry nothing."""
     lone: set[int] = set()
     for i in range(3, len(tree.kind)):

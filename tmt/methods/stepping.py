@@ -1,22 +1,17 @@
-"""What a method of integration is, `Method`, and the `Dynamics` that its `slope` asks for accelerations.
-
-Another way to have accelerations is a subclass of Dynamics: with calls in compiled code (forms.py), with
-derivatives by those of the linear system (derivatives.py).
-"""
+"""What a method of integration is: `Method`, whose `slope` asks a Form of the dynamics for accelerations."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from tmt.derivation import method, quantities
 from tmt.derivation.coordinates import Coordinates, coordinates_of
-from tmt.derivation.mechanism import AnyTree
-from tmt.derivation.quantities import Form
-from tmt.derivation.vectors import Rows, Scalar, Values, added, minus, plus, solve, solve_any, weighted
+from tmt.derivation.form import LITERAL, Form
+from tmt.derivation.mechanism import Mechanism
+from tmt.derivation.vectors import Scalar, Values, plus, weighted
 from tmt.model.values import listed, real_numbers, shown
 
 Slope = Callable[[Values, Values], Values]
@@ -24,53 +19,6 @@ State = tuple[Values, Values]
 Numbers = tuple[float, ...]
 DIVERGED, NEWTON, SMALL, MANY = 1, 2, 3, 4  # why a run ends; 0: it does not
 MOST_EVALUATIONS = 100_000_000  # of the dynamics, in a run of an adaptive method
-
-
-class Implicit(NamedTuple):
-    """What a method takes at the end of its step: (Mbar + matrix [+ dt dh/dqd in rows]) a = Qbar - force."""
-
-    matrix: Rows  # (nv, nv)
-    force: Values  # (nv,), N m
-    dt: Scalar  # s
-    bias_rows: frozenset[int]  # speeds of whose bias it takes the change
-
-    @property
-    def acts_at_single_joints(self) -> bool:
-        across = [x for i, row in enumerate(self.matrix) for j, x in enumerate(row) if i != j]
-        return not self.bias_rows and all(isinstance(x, float) and x == 0.0 for x in across)
-
-
-class Dynamics:
-    """Accelerations from Mbar and h, as a Form has their sums."""
-
-    def __init__(self, form: Form = quantities.LITERAL):
-        self.form = form
-
-    def acceleration(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, implicit: Implicit | None = None
-    ) -> Values:
-        """a (nv,) from Mbar a = Qbar, or from the linear system of an implicit method."""
-        M, h = self.form.terms(tree, q, qd)
-        force = method.reduced_force(tree, h, q, qd, tau)
-        if implicit is None:
-            return solve(M, force)
-        matrix = added(M, implicit.matrix)
-        if implicit.bias_rows:
-            rates = self.bias_rates(tree, q, qd)
-            for i in implicit.bias_rows:
-                matrix[i] = plus(matrix[i], [implicit.dt * rate for rate in rates[i]])
-        return self.solve_any(matrix, minus(force, implicit.force))
-
-    def bias_rates(self, tree: AnyTree, q: Values, qd: Values) -> Rows:
-        if self.form.rates is None:
-            return method.bias_rates(tree, q, qd, self.form.terms)
-        return self.form.rates(tree, q, qd, [0.0] * len(qd))[1]
-
-    def solve_any(self, matrix: Rows, right: Values) -> Values:
-        return solve_any(matrix, right)
-
-
-LITERAL = Dynamics()
 
 
 class Method(ABC):
@@ -99,9 +47,9 @@ class Method(ABC):
         return len(positions)
 
     def slope(
-        self, tree: AnyTree, q: Values, qd: Values, tau: Values, dt: Scalar, dynamics: Dynamics = LITERAL
+        self, tree: Mechanism, q: Values, qd: Values, tau: Values, dt: Scalar, form: Form = LITERAL
     ) -> Values:
-        return dynamics.acceleration(tree, q, qd, tau)
+        return form.acceleration(tree, q, qd, tau)
 
     @abstractmethod
     def step(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> State:

@@ -34,7 +34,7 @@ def indices(name: str, values: Iterable[float], ends: Iterable[int]) -> Indices:
     return tuple(map(int, indices))
 
 
-def gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
+def gain(name: str, values: Any, coordinates: Coordinates) -> Rows:
     if isinstance(values, tuple | list) and not values:
         return ()
     rows = numbers_of(name, values, (coordinates.nv, coordinates.nv))
@@ -46,7 +46,7 @@ def gain(name: str, values: Any, coordinates: Coordinates) -> Rows[float]:
     return rows if fed.any() else ()
 
 
-def check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers[float]) -> None:
+def check_ball(i: int, axes: NDArray[np.float64], reference: float, rest: Numbers) -> None:
     check_axes(f"the axes of joint {i}, a ball,", axes)
     if reference:
         raise ValueError(f"Tree.reference[{i}] is {reference:g}; 0 is expected of a ball")
@@ -59,7 +59,7 @@ def check_axes(whose: str, axes: NDArray[np.float64]) -> None:
         raise ValueError(f"{whose} are {axes.tolist()}; a right-handed frame is expected")
 
 
-def direction(i: int, axis: Numbers[float]) -> Numbers[float]:
+def direction(i: int, axis: Numbers) -> Numbers:
     exponent = math.frexp(max(map(abs, axis)))[1]
     axis = tuple(math.ldexp(a, -exponent) for a in axis)  # exact, and the squares neither overflow nor vanish
     length = float(np.linalg.norm(axis))

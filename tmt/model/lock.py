@@ -52,7 +52,7 @@ class Carrier(NamedTuple):
 WORLD = Carrier(-1, ZERO, IDENTITY)
 
 
-def locked(tree: Mechanism[float], angles: Mapping[str, Any]) -> dict[str, Any]:
+def locked(tree: Mechanism, angles: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that differ in the tree without the joints that are named in `angles`, see Tree.lock."""
     names, joints = tree.joint_names, tree.coordinates.joints
     if not isinstance(angles, Mapping):
@@ -108,7 +108,7 @@ def chosen(values: Sequence[Value], places: Sequence[int]) -> tuple[Value, ...]:
     return tuple(values[i] for i in places) if values else ()
 
 
-def _refuse_fed_back(tree: Mechanism[float], locked_names: Any, q: Sequence[float]) -> None:
+def _refuse_fed_back(tree: Mechanism, locked_names: Any, q: Sequence[float]) -> None:
     """Raise ValueError if a locked joint's position makes a torque at a free one: no Tree has that."""
     joints = dict(zip(tree.joint_names, tree.coordinates.joints))
     for name in locked_names if tree.position_gain else ():
@@ -121,7 +121,7 @@ def _refuse_fed_back(tree: Mechanism[float], locked_names: Any, q: Sequence[floa
                 raise ValueError(f"{name!r} cannot be locked at {shown(position)}: {torque}; {expected}")
 
 
-def _fixed(tree: Mechanism[float], i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
+def _fixed(tree: Mechanism, i: int, q: Sequence[float]) -> tuple[Vector, Matrix]:
     joint = tree.coordinates.joints[i]
     if any(q[joint.q][1:]) if joint.kind == "ball" else q[joint.q.start] != tree.reference[i]:
         return origin_in_parent(tree, i, q), rotation_in_parent(tree, i, q)

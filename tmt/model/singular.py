@@ -22,7 +22,7 @@ CLEAR = 1e-6  # a share of the inertia that is carried, far above rounding
 APART = 1e-3  # sine of the angle between two axes that are clearly not parallel
 
 
-def scales(tree: Mechanism[float]) -> Array:
+def scales(tree: Mechanism) -> Array:
     """The largest value of each Mbar_ii, kg m2, (nv,): all that is carried stretched out, slides by 1 m."""
     sums = np.array(tree.armature)
     for mass, com, inertia, carrier in zip(tree.mass, tree.com, tree.inertia, tree.body_joint):
@@ -35,7 +35,7 @@ def scales(tree: Mechanism[float]) -> Array:
 
 
 @lru_cache(maxsize=256)  # not in the Tree: vars(tree) are its fields
-def never(tree: Mechanism[float]) -> bool:
+def never(tree: Mechanism) -> bool:
     """Whether Mbar is regular at every q, by an argument from the tips inward: False may also mean unknown.
 
     A joint whose own rotor has inertia is at rest if nothing moves. A body with inertia about every axis is
@@ -67,7 +67,7 @@ def never(tree: Mechanism[float]) -> bool:
     return len(resting) == len(joints)
 
 
-def _turn_alone(tree: Mechanism[float], turning: list[int]) -> bool:
+def _turn_alone(tree: Mechanism, turning: list[int]) -> bool:
     if len(turning) == 1:
         return True
     outer, inner = turning[:2]
@@ -78,7 +78,7 @@ def _turn_alone(tree: Mechanism[float], turning: list[int]) -> bool:
     return bool(np.linalg.norm(np.cross(axes[0], axes[1])) > APART)
 
 
-def mass_matrices(tree: Mechanism[float], q: Array) -> Array:
+def mass_matrices(tree: Mechanism, q: Array) -> Array:
     """Mbar at positions q (N, nq): (N, nv, nv), in time that grows less with n than that of method.py."""
     count, n = len(q), len(tree.axis)
     total = np.zeros((count, n, n)) + np.diag(tree.armature)
@@ -94,7 +94,7 @@ def mass_matrices(tree: Mechanism[float], q: Array) -> Array:
     return total
 
 
-def found(tree: Mechanism[float], M: Array) -> NDArray[np.bool_]:
+def found(tree: Mechanism, M: Array) -> NDArray[np.bool_]:
     """Which joints move without moving mass, (..., n), for Mbar (..., nv, nv): none where it is regular."""
     root = np.sqrt(scales(tree))
     values, vectors = np.linalg.eigh(M / np.multiply.outer(root, root))
@@ -104,7 +104,7 @@ def found(tree: Mechanism[float], M: Array) -> NDArray[np.bool_]:
     return np.stack([speeds[..., joint.qd].any(axis=-1) for joint in tree.coordinates.joints], axis=-1)
 
 
-def reason(tree: Mechanism[float], moving: Iterable[bool]) -> str:
+def reason(tree: Mechanism, moving: Iterable[bool]) -> str:
     """Which joints, as given by `found`, move without moving mass, in words."""
     chosen = [i for i, moves in enumerate(moving) if moves]
     names = [repr(tree.joint_names[i]) for i in chosen]
@@ -116,7 +116,7 @@ def reason(tree: Mechanism[float], moving: Iterable[bool]) -> str:
     return f"{kind}s {', '.join(names)} {move} together without moving any mass"
 
 
-def check_tree(tree: Mechanism[float]) -> None:
+def check_tree(tree: Mechanism) -> None:
     """Raise ValueError if Mbar is singular at every q, or its numbers are beyond those of a double."""
     with np.errstate(all="ignore"):
         size = scales(tree)
@@ -139,7 +139,7 @@ def check_tree(tree: Mechanism[float]) -> None:
         raise ValueError(f"{reason(tree, turning[0])}; Mbar is singular at every q")
 
 
-def first(tree: Mechanism[float], q: Array, M: Array | None = None) -> tuple[int, str] | None:
+def first(tree: Mechanism, q: Array, M: Array | None = None) -> tuple[int, str] | None:
     """The first of the states q (N, nq) at which Mbar is singular, and why; None if there is none."""
     if never(tree) or not len(q):
         return None

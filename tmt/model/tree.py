@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,8 +27,8 @@ NOT_NEGATIVE = {"mass": "kg", "damping": "N m s/rad", "armature": "kg m2", "stif
 NAMES_SHOWN = 60  # characters
 
 
-@dataclass(frozen=True)
-class Tree(Mechanism[float]):
+@dataclass(frozen=True, init=False)
+class Tree(Mechanism):
     """A tree of n joints and m rigid bodies.
 
     At the reference positions of the joints every frame is parallel to the inertial frame.
@@ -79,23 +79,20 @@ class Tree(Mechanism[float]):
     (2.0,)
     """
 
-    if TYPE_CHECKING:  # what is accepted, which becomes nested tuples
-
-        def __init__(
-            self, joint_names: Sequence[str], parent: ArrayLike, offset: ArrayLike, axis: ArrayLike,
-            damping: ArrayLike, body_names: Sequence[str], body_joint: ArrayLike, mass: ArrayLike,
-            com: ArrayLike, inertia: ArrayLike, gravity: ArrayLike, kind: Sequence[str] = (),
-            armature: ArrayLike = (), stiffness: ArrayLike = (), rest: ArrayLike = (), reference: ArrayLike = (),
-            position_gain: ArrayLike = (), speed_gain: ArrayLike = (), site_names: Sequence[str] = (),
-            site_joint: ArrayLike = (), site_offset: ArrayLike = (), site_rotation: ArrayLike = (),
-        ) -> None: ...  # fmt: skip
-
-    def __post_init__(self) -> None:
+    def __init__(
+        self, joint_names: Sequence[str], parent: ArrayLike, offset: ArrayLike, axis: ArrayLike, damping: ArrayLike,
+        body_names: Sequence[str], body_joint: ArrayLike, mass: ArrayLike, com: ArrayLike, inertia: ArrayLike,
+        gravity: ArrayLike, kind: Sequence[str] = (), armature: ArrayLike = (), stiffness: ArrayLike = (),
+        rest: ArrayLike = (), reference: ArrayLike = (), position_gain: ArrayLike = (), speed_gain: ArrayLike = (),
+        site_names: Sequence[str] = (), site_joint: ArrayLike = (), site_offset: ArrayLike = (),
+        site_rotation: ArrayLike = (),
+    ) -> None:  # fmt: skip
+        given = locals()
         for name in ("joint_names", "body_names", "site_names"):
-            self._set(name, names(name, getattr(self, name)))
+            self._set(name, names(name, given[name]))
         n, m, k = len(self.joint_names), len(self.body_names), len(self.site_names)
-        self._set("kind", checks.kinds(self.kind, n))
-        nq, nv = self.coordinates.nq, self.coordinates.nv
+        self._set("kind", checks.kinds(kind, n))
+        nq, nv = self.nq, self.nv
         shapes = {
             "parent": (n,), "offset": (n, 3), "axis": (nv, 3), "damping": (nv,),
             "body_joint": (m,), "mass": (m,), "com": (m, 3), "inertia": (m, 3, 3), "gravity": (3,),
@@ -103,12 +100,12 @@ class Tree(Mechanism[float]):
             "site_joint": (k,), "site_offset": (k, 3), "site_rotation": (k, 3, 3),
         }  # fmt: skip
         for name, shape in shapes.items():
-            value = getattr(self, name)
+            value = given[name]
             if name in OPTIONAL and isinstance(value, tuple | list) and not value:
                 value = self.zero if name == "rest" else np.broadcast_to(ABSENT.get(name, 0.0), shape)
             self._set(name, numbers_of(name, value, shape))
         for name in GAINS:
-            self._set(name, checks.gain(name, getattr(self, name), self.coordinates))
+            self._set(name, checks.gain(name, given[name], self.coordinates))
         if n == 0 or m == 0:
             raise ValueError("a Tree needs at least one joint and one body")
         self._set("parent", checks.indices("parent", self.parent, range(n)))
@@ -132,9 +129,8 @@ class Tree(Mechanism[float]):
         object.__setattr__(self, name, value)
 
     def __hash__(self) -> int:
-        return hash(
-            (self.joint_names, self.mass)
-        )  # a key of caches in each call: all fields take as long as M
+        """Of some fields: it is a key of caches in each call, and all take as long as M."""
+        return hash((self.joint_names, self.mass))
 
     def __repr__(self) -> str:
         n, m = len(self.joint_names), len(self.body_names)

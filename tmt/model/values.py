@@ -75,7 +75,7 @@ def nested(item: Any) -> Any:
     return tuple(map(nested, item)) if isinstance(item, list) else item
 
 
-def states(model: Mechanism[float], **arrays: ArrayLike) -> list[Array]:
+def states(model: Mechanism, **arrays: ArrayLike) -> list[Array]:
     """Arrays (..., nq), q, or (..., nv) of one batch shape, after a check of type, shape and values."""
     checked = {name: _state(model, name, values) for name, values in arrays.items()}
     if "q" in checked:
@@ -88,7 +88,7 @@ def states(model: Mechanism[float], **arrays: ArrayLike) -> list[Array]:
     return [np.broadcast_to(array, (*batch, array.shape[-1])) for array in checked.values()]
 
 
-def _state(model: Mechanism[float], name: str, values: ArrayLike) -> Array:
+def _state(model: Mechanism, name: str, values: ArrayLike) -> Array:
     n = {"q": model.coordinates.nq, "dt": 1}.get(name, model.coordinates.nv)
     array = real_numbers(values)
     if array is None:
@@ -106,7 +106,7 @@ def _state(model: Mechanism[float], name: str, values: ArrayLike) -> Array:
     return array
 
 
-def _check_quaternions(model: Mechanism[float], q: Array) -> None:
+def _check_quaternions(model: Mechanism, q: Array) -> None:
     for name, joint in zip(model.joint_names, model.coordinates.joints):
         if joint.kind != "ball":
             continue
