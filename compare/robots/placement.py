@@ -5,7 +5,7 @@ on its axis, that of a slide anywhere: the stated ones are put at the foot of th
 Frames may be parallel at any position of the joints, and the robot with its gravity may be moved and turned.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, NamedTuple
@@ -36,43 +36,24 @@ class Matched(NamedTuple):
 
 def matched_joints(reference: tmt.Tree, tree: tmt.Tree, whose: str) -> Matched:
     """The joints of a tree for those of a reference: by name, else by their order. Unmatched, if one is left."""
-    pairs = same_names(reference.joint_names, tree.joint_names)
-    left = [j for j in range(len(tree.joint_names)) if j not in pairs.values()]
+    names, right = tree.joint_names, reference.joint_names
+    pairs = {i: names.index(name) for i, name in enumerate(right) if name in names}
     for i, kind in enumerate(reference.kind):
-        alike = [j for j in left if tree.kind[j] == kind]
+        alike = [j for j in range(len(names)) if j not in pairs.values() and tree.kind[j] == kind]
         if i not in pairs and alike:
             pairs[i] = alike[0]
-            left.remove(alike[0])
-    refuse_unmatched(reference, tree, pairs, whose)
-    names = tuple(tree.joint_names[pairs[i]] for i in range(len(reference.joint_names)))
-    renamed = [f"{name} as {right}" for name, right in zip(names, reference.joint_names) if name != right]
-    return Matched(names, tuple(renamed))
-
-
-def same_names(reference: Sequence[str], names: Sequence[str]) -> dict[int, int]:
-    """Joints of the same name, also with other capital letters: {index: index}."""
-    pairs = {i: names.index(name) for i, name in enumerate(reference) if name in names}
-    lower, right = [name.casefold() for name in names], [name.casefold() for name in reference]
-    for i, name in enumerate(right):
-        is_only_one = lower.count(name) == right.count(name) == 1
-        if i not in pairs and is_only_one and lower.index(name) not in pairs.values():
-            pairs[i] = lower.index(name)
-    return pairs
-
-
-def refuse_unmatched(reference: tmt.Tree, tree: tmt.Tree, pairs: Mapping[int, int], whose: str) -> None:
-    """Unmatched, if a joint is missing, additional, or of another kind."""
-    wrong = []
-    for i, j in sorted(pairs.items()):
-        if reference.kind[i] != tree.kind[j]:
-            expected = f"expected a {reference.kind[i]} as in {whose}"
-            wrong.append(f"joint {tree.joint_names[j]} is a {tree.kind[j]}, {expected}")
+    wrong = [
+        f"joint {names[j]} is a {tree.kind[j]}, expected a {reference.kind[i]} as in {whose}"
+        for i, j in sorted(pairs.items())
+        if reference.kind[i] != tree.kind[j]
+    ]
     for word, joints, matched in (("missing", reference, pairs.keys()), ("additional", tree, pairs.values())):
-        left = [k for k in range(len(joints.joint_names)) if k not in matched]
-        if left:
+        if left := [k for k in range(len(joints.joint_names)) if k not in matched]:
             wrong.append(f"{word} joints: {some_of(named_with_kind(joints, left))}")
     if wrong:
         raise Unmatched("; ".join(wrong))
+    found = tuple(names[pairs[i]] for i in range(len(right)))
+    return Matched(found, tuple(f"{name} as {other}" for name, other in zip(found, right) if name != other))
 
 
 def named_with_kind(tree: tmt.Tree, joints: Sequence[int]) -> list[str]:
@@ -127,18 +108,23 @@ def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
     joints = [tree.joint_names.index(name) for name in stated.joint_names]
     reference = tuple(tree.reference[joint] for joint in joints)
     differs = [name for name, a, b in zip(stated.joint_names, stated.reference, reference) if a != b]
-    wanted, most, there = vectors_of(tree, joints), -1, stated
-    for drawn in ((), tuple(differs))[: 1 + bool(differs)]:
-        robot = drawn_at(stated, reference) if drawn else stated
+    wanted, tried = vectors_of(tree, joints), list[tuple[int, tmt.Tree, np.ndarray]]()
+    for robot in (stated, drawn_at(stated, reference))[: 1 + bool(differs)]:
         vectors = vectors_of(robot, range(len(joints)))
         for turn in (np.eye(3), *rotations(vectors, wanted)):
-            if (count := same_vectors(vectors @ turn.T, wanted).sum()) > most:
-                most, found, there = count, (drawn, turn), robot
-    drawn, turn = found
+            tried.append((same_vectors(vectors @ turn.T, wanted).sum(), robot, turn))
+    _, there, turn = max(tried, key=lambda trial: trial[0])  # the first of the best
+    drawn = () if there is stated else tuple(differs)
     anchors, axes = places_of(there)
     centres = (anchors[list(there.body_joint)] + np.array(there.com)) @ turn.T
     anchors, axes, others = anchors @ turn.T, axes @ turn.T, places_of(tree)[0][joints]
-    free = np.array([directions(kind, axis) for kind, axis in zip(there.kind, axes)])
+    # onto directions in which an anchor may be moved without another motion
+    onto = {
+        "slide": lambda axis: np.eye(3),
+        "hinge": lambda axis: np.outer(axis, axis),
+        "ball": lambda axis: np.zeros((3, 3)),
+    }
+    free = np.array([onto[kind](axis) for kind, axis in zip(there.kind, axes)])
     tolerance = SAME * max(1.0, np.abs(anchors).max(), np.abs(others).max())
     shift = shifted(anchors, others, free, tolerance)
     to_foot = np.einsum("nij,nj->ni", free, others - anchors - shift)
@@ -219,13 +205,6 @@ def frame_of(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
         return None
     x, z = first / np.linalg.norm(first), normal / np.linalg.norm(normal)
     return np.column_stack([x, np.cross(z, x), z])
-
-
-def directions(kind: str, axis: np.ndarray) -> np.ndarray:
-    """The projection, (3, 3), onto directions in which an anchor may be moved without another motion."""
-    if kind == "slide":
-        return np.eye(3)
-    return np.outer(axis, axis) if kind == "hinge" else np.zeros((3, 3))
 
 
 def shifted(anchors: np.ndarray, others: np.ndarray, free: np.ndarray, tolerance: float) -> np.ndarray:

@@ -21,7 +21,6 @@ EDITS = (
     ("joint_map", "put", "np.argsort(at)", "at", "an order is taken the other way"),
     ("joint_map", "JointMap.after", "stated.sign * inner.zero", "inner.zero", "the first zero of two keeps its sense"),
     ("joint_map", "within_a_turn", "zero if slides else _1", "_1", "the zero of a slide is turned back"),
-    ("robots.placement", "same_names", "_1 == right.count(name) == 1", "_1 >= 1", "either of two names alike is taken"),
     ("robots.placement", "matched_joints", "tree.kind[j] == kind", "True", "joints are matched whatever they are"),
     # the comparison
     ("agreement.comparison", "Compared.ratio", "share_of(_1, _2)", "share_of(np.where(np.isfinite(_1), _1, 0.0), _2)",

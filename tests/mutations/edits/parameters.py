@@ -13,9 +13,9 @@ EDITS = (
          f"{name} is read as stated")
         for name in READ
     ),
-    ("robots.placement", "placed", "_1 > most", "_1 >= most", "a robot is turned and drawn though no more is the same"),
+    ("robots.placement", "placed", "max(tried, *_1)", "max(tried[::-1], *_1)", "a robot is turned though no more is the same"),
     ("robots.placement", "placed", "to_foot * _1", "others - anchors - shift", "an anchor may be anywhere"),
-    ("robots.placement", "directions", "np.zeros((3, 3))", "np.eye(3)", "the anchor of a ball may be anywhere"),
+    ("robots.placement", "placed", "np.zeros((3, 3))", "np.eye(3)", "the anchor of a ball may be anywhere"),
     ("mujoco.locked", "join", "masses.sum()", "masses.max()", "the mass of one body is that of several", 1),
     ("mujoco.locked", "compiled", "not model.body_subtreemass[body]", "False", "a link may move without mass"),
     ("mujoco.locked", "compiled_without", "not bare and _1", "False", "neighbours touch where joints are locked"),
@@ -66,7 +66,7 @@ EDITS = (
     ("robots.file", "coarsest", "2 * count <= most", "count <= most", "one doubling more than afforded"),
     ("robots.file", "added_damping", "2.0 * np.sqrt(_1)", "20.0 * np.sqrt(_1)", "damping ten times stronger"),
     ("robots.states", "largest_speeds_and_torques", "10.0 * np.diag(mass_matrix)", "np.diag(mass_matrix)", "torques a tenth"),
-    ("robots.placement", "refuse_unmatched", "reference.kind[i] != tree.kind[j]", "False", "a slide matches a hinge"),
+    ("robots.placement", "matched_joints", "reference.kind[i] != tree.kind[j]", "False", "a slide matches a hinge"),
     ("robots.scene_file", "read_scenes", "scene.name in names", "False", "two scenes have one name"),
     ("robots.scene_file", "scene_of", "'dt' not in values", "False", "a scene needs a dt"),
     ("robots.scene", "Scene.require_coordinates", "all(_1)", "True", "a quaternion may have any length"),
