@@ -57,9 +57,9 @@ def clear_up(files: Path) -> None:
             work.parent.rmdir()
 
 
-def saved(place: Path, key: str) -> object:
+def saved(place: Path, key: str) -> dict[str, Any] | None:
     """What was saved as the row of a report, if it depends on the same things and the report is whole."""
-    with suppress(Exception):  # whatever lies there, it is data
+    with suppress(OSError, ValueError, TypeError):
         saved_key, files, row = json.loads((place / MARK).read_bytes())
         return row if saved_key == key and files == hashes(place) else None
     return None

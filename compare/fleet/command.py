@@ -5,8 +5,7 @@ import os
 import shlex
 import time
 from collections.abc import Sequence
-from contextlib import closing
-from functools import partial
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,7 +34,6 @@ def fleet_reference(text: str) -> str:
     return stated_reference(text)
 
 
-LOADED = "compare.fleet.loaded"
 FLEET_OPTIONS = {
     "--out": Option(metavar="DIR", default=f"reports/{FLEET}"),
     "--full": Option(None),
@@ -83,14 +81,9 @@ def fleet_status(arguments: Sequence[str]) -> int:
     if options.workers and options.dask:
         made.error("--workers cannot be combined with --dask")
     names = experiments_of(made, options)
-    return run_fleet(options, names, shlex.join(["python", "-m", "compare", FLEET, *arguments]))
-
-
-def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str) -> int:
-    """Compare all files and write the table; the exit status."""
     started = time.perf_counter()
     from .cache import locked  # imports are slow
-    from .executors import Cluster, Pool
+    from .executors import Cluster, Executor, Pool
     from .models import found_models
     from .run import Run
     from .table import write_table
@@ -100,13 +93,14 @@ def run_fleet(options: argparse.Namespace, names: tuple[str, ...], command: str)
     models, left_out = found_models(options.paths)
     solution = solution_of(options.reference)
     path = os.path.abspath(solution.path) if solution else ""
+    command = shlex.join(["python", "-m", "compare", FLEET, *arguments])
     file_options = FleetOptions(names, not options.full, options.reference, path)
-    make = (
-        partial(Cluster, options.dask)
-        if options.dask
-        else partial(Pool, options.workers or cores(), loaded=[LOADED])
-    )
-    with locked(out), closing(make(options.limit)) as executor:
+    with locked(out), ExitStack() as stack:
+        if options.dask:
+            executor: Executor = Cluster(options.dask, options.limit)
+        else:
+            executor = Pool(options.workers or cores(), options.limit, loaded=["compare.fleet.loaded"])
+        stack.callback(executor.close)
         run = Run(models, file_options, executor, out, solution)
         terminal.how_far = run.progress
         with terminal.progress(""):

@@ -13,7 +13,7 @@ from ..core.text import block
 from .cache import program, save, saved
 from .executors import Executor, Outcome
 from .models import Model, place_of_report
-from .table import BROKE, REFUSED, FileRow, row_of_data
+from .table import BROKE, REFUSED, FileRow
 from .task import FleetOptions, compare_file
 
 POLLING = 0.3  # s between two questions whether somebody is left to answer
@@ -69,8 +69,8 @@ class Run:
         inputs = repr((program(), contents, of_solution, model.shown, self.options))
         key = hashlib.sha256(inputs.encode("utf-8", "backslashreplace")).hexdigest()
         place = self.out / place_of_report(model.shown)
-        if row := row_of_data(saved(place, key)):
-            self.rows.append(row)
+        if row := saved(place, key):
+            self.rows.append(FileRow(**row))
             return
         paths = os.path.abspath(model.path), os.path.abspath(place)
         answer = self.executor.submit(compare_file, model.shown, *paths, self.options)

@@ -2,10 +2,9 @@
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import get_type_hints
 from urllib.parse import quote
 
 from ..core.check import About
@@ -74,17 +73,7 @@ class FileRow(Row):
 
 
 LeftOut = Sequence[tuple[str, str]]  # files that are no models, and why
-HINTS = get_type_hints(FileRow)
-FIELDS = {field.name: HINTS[field.name] for field in fields(FileRow)}
 FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if name != "has_report")
-
-
-def row_of_data(data: object) -> FileRow | None:
-    """The row whose fields, by name, lay in the folder of a report; None if they are not those of a row."""
-    if not isinstance(data, dict) or data.keys() != FIELDS.keys() or data["verdict"] not in VERDICTS:
-        return None
-    are_right = all(isinstance(data[name], kind) for name, kind in FIELDS.items())
-    return FileRow(**data) if are_right else None
 
 
 def judge(row: FileRow, report: Report, reference: Reference) -> None:

@@ -1,8 +1,6 @@
 """A fleet is run in the process of the test: rows, reports, what is computed again, and what becomes of files that break."""
 
-import json
 import os
-import pickle
 from concurrent.futures import Future
 from contextlib import chdir
 from pathlib import Path
@@ -125,26 +123,6 @@ def test_what_has_changed_is_computed_anew_and_nothing_else(fleet, tmp_path):
         (tmp_path / "solution.xml").write_text(PENDULUM.format(place))
         found = fleet({}, answer=agrees, paths=["m/a.xml"], reference="solution.xml")
         assert len(found.executor.calls) == computed
-
-
-class Touch:
-    """What a pickle of it runs."""
-
-    def __reduce__(self):
-        return Path.touch, (Path("ran"),)
-
-
-def test_what_lies_in_the_folder_of_a_report_is_data_and_a_row_or_computed_anew(fleet, tmp_path):
-    fleet(ONE, answer=agrees)
-    mark = report(tmp_path, "a.xml") / ".fleet"
-    key, files, row = json.loads(mark.read_text())
-    assert fleet({}, answer=agrees).executor.calls == []
-    wrong = {"verdict": "fine"}, {"worst_ratio": "1"}, {"reason": [1]}, {"other": 1}
-    poisons = [json.dumps((key, files, other)).encode() for other in ([row], *(row | more for more in wrong))]
-    for poison in (*poisons, pickle.dumps((key, files, Touch()))):
-        mark.write_bytes(poison)
-        assert fleet({}, answer=agrees).executor.calls == ["m/a.xml"], poison
-    assert not Path("ran").exists()
 
 
 def test_a_copy_has_the_row_of_the_first_file_and_is_not_computed(fleet):

@@ -19,8 +19,6 @@ EDITS = (
     ("export.command", "identifier", "_1 and not is_word(name)", "_1", "a function is named like a word of a language"),
     ("fleet.table", "FileRow.order", "VERDICTS.index", "VERDICTS[::-1].index", "what agrees comes first"),
     ("fleet.table", "judge", 'reference.kind == "model"', "False", "what was compared with itself agrees"),
-    ("fleet.table", "row_of_data", "data['verdict'] not in VERDICTS", "False", "what lies in a folder is a row"),
-    ("fleet.table", "row_of_data", "_1 if are_right else None", "_1", "any value is that of a row"),
     ("fleet.models", "Model.contents", "part.read_bytes()", "name.encode()", "changed files are forgotten"),
     ("fleet.run", "Run.start", "self.solution.contents if self.solution else ()", "()", "another solution is the same"),
     ("fleet.cache", "saved", "files == hashes(place)", "True", "a report that is gone or edited passes for saved"),
