@@ -16,13 +16,8 @@ from ..robots import Robot
 UNKNOWN = Experiment()
 MOST_FIGURES, FIRST_FIGURES = 4, 2  # of a section that are not folded; the first, where there are more
 # kinds of checks that fail, by what they are about; only the first say that the two models differ
-KINDS = {
-    "differing": About.MODELS,
-    "broke": About.PROGRAM,
-    "unstable": About.STEP,
-    "unconfirmed": About.PREDICTION,
-    "of_engines": About.ENGINE,
-}
+KINDS = {"differing": About.MODELS, "broke": About.PROGRAM, "unstable": About.STEP}
+KINDS |= {"unconfirmed": About.PREDICTION, "of_engines": About.ENGINE}
 OVERVIEW = "overview_"  # how the files of the pictures of the first screen begin
 
 
@@ -111,9 +106,7 @@ class Report(NamedTuple):
     skipped: Sequence[tuple[str, str]] = ()  # experiments, and why
     reference: Mapping[str, str] | None = None  # kind and name of what MuJoCo is compared with
     first_lines: Sequence[str] = ()  # what is said of it
-    plain: Mapping[str, Any] | None = (
-        None  # how plain MuJoCo evaluates states, see engines.mujoco.Mujoco.plain
-    )
+    plain: Mapping[str, Any] | None = None  # how plain MuJoCo evaluates states, see Mujoco.plain
     is_complete: bool = True  # an interrupt ends a run before all experiments are finished
 
     @property

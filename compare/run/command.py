@@ -73,13 +73,8 @@ def carry_out(experiment: str, options: Options, command: str) -> int:
     program = "reproduce.py" if (out / "reproduce.py").exists() else ""
     terminal.say(block("run", "report", path=page, seconds=seconds, program=program))
     if options.json:
-        printed = {
-            "passed": report.passed,
-            "verdict": report.verdict.split("\n"),
-            "answer": report.answer,
-            "causes": [cause.record() for cause in report.causes],
-            "report": page,
-        }
+        printed = {"passed": report.passed, "verdict": report.verdict.split("\n"), "answer": report.answer}
+        printed |= {"causes": [cause.record() for cause in report.causes], "report": page}
         print(json.dumps(printed, indent=1), file=Stream(sys.stdout), flush=True)
     if options.open:
         webbrowser.open((out / "index.html").as_uri())

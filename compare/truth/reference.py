@@ -25,10 +25,7 @@ RECORDS = 64  # states of a run, without its start
 LOST = 1e-30  # error of a run in pairs relative to the growth of a small difference, about
 DOUBLES = "dopri8"  # the method of a run in doubles
 MOST_DOUBLINGS = 5  # of the number of its steps
-OF_ROUNDING, MOST_OF_ROUNDING = (
-    "rk4",
-    2**14,
-)  # the method whose run shows the growth of rounding, and its steps
+OF_ROUNDING, MOST_OF_ROUNDING = "rk4", 2**14  # the method whose run shows the growth of rounding, its steps
 DIVERGES = 1.05  # growth in a step that overflows in the thousands of steps of a run
 
 

@@ -50,7 +50,8 @@ def test_numbers_that_an_option_changes_are_no_checks_and_have_its_name():
     assert asked["arm", "mass"] == asked["rod", "mass"] == asked["arm", "inertia"] == "settotalmass"
     assert asked["rod", "com"] and asked["rod", "com"] != "settotalmass" and asked["lift", "damping"] == ""
     changed = [row for row in result.rows if row.asked_by and row.difference]
-    assert parameters.headline(result).values["changed"] == len(changed) > 0
+    numbers = parameters.headline(result).values
+    assert numbers["changed"] == len(changed) > 0 == numbers["off"]
     assert (rows["lift", "damping"].unit, rows["turn", "damping"].unit) == ("N s/m", "N m s/rad")
 
 
@@ -68,11 +69,8 @@ def test_a_number_may_be_off_by_its_tolerance(quantity, stated, share, passes):
 def test_a_row_has_what_is_compiled_less_what_is_stated():
     stated, compiled = np.array([1.0, 2.0, -3.0]), np.array([1.5, 2.0, 3.0])
     rows = rows_of(Stated("arm", "com", stated, compiled), "m")
-    assert [(row.stated, row.compiled, row.difference) for row in rows] == [
-        (1.0, 1.5, 0.5),
-        (2.0, 2.0, 0.0),
-        (-3.0, 3.0, 6.0),
-    ]
+    found = [(row.stated, row.compiled, row.difference) for row in rows]
+    assert found == [(1.0, 1.5, 0.5), (2.0, 2.0, 0.0), (-3.0, 3.0, 6.0)]
     assert rows_of(Stated("arm", "com", None, compiled), "m")[0].difference is None
 
 
@@ -84,14 +82,6 @@ def test_an_axis_of_the_opposite_sense_is_a_convention_and_is_said(compiled, ran
     causes = causes_of([compare_number(Result("parameters"), number, "")], ("here", "there"))
     assert {cause.rank for cause in causes} == {rank}
     assert {"opposite sign" in cause.text for cause in causes} == {is_said}
-
-
-def test_numbers_that_differ_are_counted_apart_from_those_that_an_option_changes():
-    result = Result("parameters")
-    for compiled, asked_by in ((2.0, ""), (2.0, "settotalmass"), (0.5, "settotalmass"), (1.0, "")):
-        result.rows += rows_of(Stated("arm", "mass", 1.0, compiled), "kg", asked_by)
-    values = parameters.headline(result).values
-    assert (values["numbers"], values["off"], values["changed"]) == (2, 1, 2)
 
 
 def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none():

@@ -13,17 +13,7 @@ import pytest
 from compare.core.cause import Cause
 from compare.core.check import AT_OWN_STEP, ENDS, About, Result
 from compare.fleet import table
-from compare.fleet.table import (
-    AGREE,
-    BROKE,
-    DIFFER,
-    ENGINE,
-    ITSELF,
-    NOT_JUDGED,
-    REFUSED,
-    UNCONFIRMED,
-    FileRow,
-)
+from compare.fleet.table import AGREE, BROKE, DIFFER, ENGINE, ITSELF, REFUSED, FileRow
 from compare.report.document import page_of
 from compare.report.verdict import Report, Section
 from compare.robots.arm import ARM
@@ -66,12 +56,12 @@ def judged(*checks, limits=(), causes=(), reference="arm"):
 @pytest.mark.parametrize("verdict, checks, more, named", [
     (AGREE, [good(1.0)], {}, ""), (ITSELF, [good()], {"reference": "model"}, ""),
     (AGREE, [good(), OWN], {}, "0.002 s, must be at most 0.001 s"),  # its own step is not stable: the reason says so
-    (NOT_JUDGED, [good(), STILL], {}, "nothing moves"), (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
+    (table.NOT_JUDGED, [good(), STILL], {}, "nothing moves"), (DIFFER, [good(2.0), STILL], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), OWN, OFF], {"causes": CAUSES}, "mass of upper"),
     (DIFFER, [good(1.0 + 1e-9), BROKEN, BROKEN], {"causes": CAUSES}, "SIGKILL, 4 times; 1 more"),
     (BROKE, [good(), BROKEN, OWN, OFF], {}, "SIGKILL, 4 times"),
     (ENGINE, [good(), OTHER], {}, "Other engines: stability: M"), (DIFFER, [good(2.0), OTHER], {"causes": CAUSES}, "another"),
-    (UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"), (REFUSED, [], {}, "no comparison"),
+    (table.UNCONFIRMED, [good(), OFF, OWN], {}, "0.01"), (REFUSED, [], {}, "no comparison"),
 ])  # fmt: skip
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
     row = judged(*checks, **more)
@@ -97,8 +87,8 @@ def test_the_own_step_is_that_of_the_own_integrator_at_all_postures(limits, stab
 
 def test_what_needs_a_look_comes_first():
     right = [
-        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (NOT_JUDGED, None, 0.5, "a"),
-        (UNCONFIRMED, None, 0.5, "a"),
+        (DIFFER, None, 1e9, "a"), (DIFFER, True, 2.0, "a"), (BROKE, None, None, "a"), (table.NOT_JUDGED, None, 0.5, "a"),
+        (table.UNCONFIRMED, None, 0.5, "a"),
         (REFUSED, None, None, "a"), (ITSELF, False, 0.1, "a"), (ITSELF, True, 0.9, "a"), (AGREE, False, 0.1, "a"),
         (AGREE, None, 0.9, "a"), (AGREE, True, 0.9, "b"), (AGREE, True, 0.0, "c"), (AGREE, None, None, "d"),
     ]  # fmt: skip
@@ -123,7 +113,7 @@ def test_a_row_is_marked_by_its_verdict_and_nothing_that_is_said_is_taken_for_ma
     assert [line[9] for line in cells] == ["10", "10", "", "10"]
     assert re.findall(r'<span class="mark (\w+)">', page) == ["good", "bad", "none", "none"]
     assert cells[2][0] == "a b.xml" and '<div class="verdict good">' in text
-    assert '<div class="verdict bad">' in cells_of([row(verdict=UNCONFIRMED)])[0]
+    assert '<div class="verdict bad">' in cells_of([row(verdict=table.UNCONFIRMED)])[0]
     said, name, value, why, reason, file = words = [f'<w{k}>&"|`*' for k in range(6)]
     more = {"left_out": [("a", why)], "origin": {name: value}, "summary": [said]}
     _, page, cells = cells_of([row(reason=reason, file=file)], **more)

@@ -29,15 +29,8 @@ LIMIT = (-KV + (KV**2 + 4.0 * INERTIA * KP) ** 0.5) / KP  # s, of Euler with thi
 
 
 def hinge(actuator=SERVO, dt=0.002, integrator="Euler", joint="", option="", keys=""):
-    values = {
-        "actuator": actuator,
-        "dt": dt,
-        "integrator": integrator,
-        "joint": joint,
-        "option": option,
-        "keys": keys,
-    }
-    return HINGE.format(**values)
+    more = {"joint": joint, "option": option, "keys": keys}
+    return HINGE.format(actuator=actuator, dt=dt, integrator=integrator, **more)
 
 
 def sphere(dampratio=1.0, impratio=1.0, pull=0.0, condim=1, x='stiffness="50" damping="50"'):

@@ -12,15 +12,9 @@ from models import chain
 import tmt
 from compare.core.check import Result
 from compare.engines.mujoco import read
+from compare.judge import run
 from compare.judge.order import ORDER_MARGIN, check_order, is_higher
-from compare.judge.run import (
-    check_movement,
-    departure,
-    deviation,
-    diverged_at,
-    leaves_no_digits,
-    required_time,
-)
+from compare.judge.run import check_movement, departure, deviation, leaves_no_digits, required_time
 from compare.robots import Robot
 from compare.robots.actuators import Controller
 from compare.robots.arm import ARM
@@ -46,7 +40,7 @@ def test_a_run_has_diverged_beyond_the_energy_that_the_arm_can_have(name, moved)
     for share, ends in ENDS:
         kinetic = share * allowed + at_first - gained
         new = np.array([np.sqrt(2.0 * kinetic / tmt.mass_matrix(case.tree, q)[0, 0]), 0.0, 0.0])
-        assert diverged_at(case, T, np.array([start, q]), np.array([rate, new])) == ends
+        assert run.diverged_at(case, T, np.array([start, q]), np.array([rate, new])) == ends
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -55,9 +49,9 @@ def test_a_run_has_diverged_where_a_number_is_not_finite(bad, of_rates):
     case = CASES["bent, held"]
     q, qd = np.tile(case.q, (4, 1)), np.zeros((4, 3))
     times = np.arange(4.0)
-    assert diverged_at(case, times, q, qd) is None
+    assert run.diverged_at(case, times, q, qd) is None
     (qd if of_rates else q)[2, 1] = bad
-    assert diverged_at(case, times, q, qd) == 2.0
+    assert run.diverged_at(case, times, q, qd) == 2.0
 
 
 @pytest.mark.parametrize("scheme, dt, judged, least", [
@@ -103,7 +97,7 @@ def test_a_run_of_any_joint_has_diverged_with_more_energy_than_its_motion_can_ha
     for share, ends in ((INSIDE, None), (OUTSIDE, t[-1])):
         wrong = v.copy()
         wrong[-1] *= np.sqrt(1.0 + share)
-        assert diverged_at(case, t, q, wrong) == ends
+        assert run.diverged_at(case, t, q, wrong) == ends
 
 
 @pytest.mark.parametrize("lifted, ends", [(1e300, None), (1e308, 0.5)])
@@ -113,7 +107,7 @@ def test_a_run_whose_energy_is_not_a_number_has_diverged(lifted, ends):
         "held", torque=(20.0,)
     )
     q = np.array([[0.0], [lifted]])
-    assert diverged_at(case, T, q, np.zeros((2, 1))) == ends
+    assert run.diverged_at(case, T, q, np.zeros((2, 1))) == ends
 
 
 @pytest.mark.parametrize("start", [0.0, 0.3, -0.7])
@@ -129,7 +123,7 @@ def test_a_servo_gives_no_more_than_it_has_stored(start):
     case = robot.case("step", posture=(start,), torque="servos", targets=0.2)
     for share, ends in ENDS:
         speeds = np.array([[0.0], [np.sqrt(1.0 + share)]])  # of 2 kg
-        assert diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends
+        assert run.diverged_at(case, T, np.array([case.q, case.q + 0.2]), speeds) == ends
 
 
 @BOTH

@@ -74,16 +74,6 @@ def test_lengths_are_from_the_joint_and_have_what_slides_have_moved():
         assert np.allclose(OF.positions[:, b, 0], COUNT[b] * REACH[:, b])
 
 
-def test_a_base_elsewhere_adds_the_rounding_of_positions_and_nothing_else():
-    """All of it 10 m farther away: 64 eps of each lever, and eps of the distance."""
-    offsets = (0.0, -10.0, 0.3), *TREE.offset[1:3], (0.0, -10.6, 0.0)
-    moved = dataclasses.replace(TREE, offset=offsets)
-    before, after = (entries.Entries(tree, Q, QD).mass_matrix[0, 5, 5] for tree in (TREE, moved))
-    levers = 0.3 + apart(TREE)[2] / 4 + np.array([0.9, 10.9]) / 64
-    assert [before, after] == pytest.approx(0.02 + 1.5 * levers**2, rel=1e-13)
-    assert after < 2.2 * before
-
-
 def test_the_mass_matrix_sums_every_term_where_it_is_largest():
     def of_body(b, s):
         return TREE.mass[b] * np.outer(MOVES[b], MOVES[b]) + LARGEST[b] * np.outer(TURNS[b], TURNS[b])
@@ -123,34 +113,6 @@ def test_energies_sum_weight_springs_and_motion():
         )
     )
     assert np.allclose(OF.energy, stored + (moving + np.array(TREE.armature) @ QD.T**2) / 2.0, rtol=1e-13)
-
-
-def test_rates_of_forces_sum_what_a_movement_changes_in_each_term():
-    """By a turn four times the terms of the bodies that it turns; by a slide levers by 1 and accelerations by S^2."""
-    qdd = np.array([[1.0, -2.0, 3.0, -4.0, 5.0, -6.0], [0.5, 0.0, -1.0, 0.0, 2.0, 7.0]])
-
-    def terms(b, s):
-        (S, V, w), sizes = moving_of(b, s), np.abs(qdd[s])
-        pushed, turning = MOVES[b] @ sizes + 2.0 * S * w + 5.0, TURNS[b] @ sizes + S**2
-        force, moment = TREE.mass[b] * pushed, LARGEST[b] * turning + TREE.mass[b] * V**2
-        return force, moment, TREE.mass[b] * turning
-
-    def by_movement(b, s):
-        force, moment, swung = terms(b, s)
-        by_turn, by_slide = force * MOVES[b] + moment * TURNS[b], force * TURNS[b] + swung * MOVES[b]
-        return 4.0 * (np.outer(by_turn, TURNS[b]) + np.outer(by_slide, SLIDES[b]))
-
-    def by_speed(b, s):
-        S, V, w = moving_of(b, s)
-        of_point = TREE.mass[b] * (S * np.outer(MOVES[b], MOVES[b]) + w * np.outer(MOVES[b], TURNS[b]))
-        of_turn = LARGEST[b] * S * np.outer(TURNS[b], TURNS[b]) + TREE.mass[b] * V * np.outer(
-            TURNS[b], SLIDES[b]
-        )
-        return 2.0 * (of_point + of_turn)
-
-    by_q, by_qd = OF.force_rates(qdd)
-    assert np.allclose(by_q, summed(by_movement) + np.diag([20.0, 5.0, 2.0, 2.0, 2.0, 0.0]), rtol=1e-13)
-    assert np.allclose(by_qd, summed(by_speed) + np.diag(TREE.damping), rtol=1e-13)
 
 
 def test_the_whole_robot_sums_its_bodies():

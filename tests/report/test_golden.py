@@ -18,10 +18,7 @@ GOLDEN = Path(__file__).with_name("golden.md")
 NUMBER = re.compile(r"(?<![A-Za-z_])[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 TIMED = "_times", "_needs", "argest speedup", "times as fast", "Cheapest for"
 NAMES = [name for name in EXPERIMENTS if name != "engines"]  # which depends on what is installed
-DEPENDS = (
-    "smallest error of",
-    "bent, held, locked:",
-)  # checks that depend on rounding: where it rules, which still joint goes
+DEPENDS = "smallest error of", "bent, held, locked:"  # on rounding: where it rules, which still joint goes
 FIXED = "#", "- *Claim", "- *Tolerance"  # lines that no run changes
 
 

@@ -206,13 +206,8 @@ def test_a_tolerance_is_in_words_and_its_formulas_are_on_a_page_of_their_own(fol
     of.tolerance = "Rounding of <each>\nentry.\n\n64 eps x L & more,\nof all."
     document = Document(report_of(folder, [of]))
     text, page = document.text(), document.tolerances()
-    assert (
-        "Rounding of &lt;each&gt; entry. [Formulas](tolerances.html#mass)." in text
-        and "64 eps x L" not in text
-    )
-    assert (
-        '<section id="mass">' in page and "64 eps x L &amp; more, of all." in page and "Rounding" not in page
-    )
+    assert "Rounding of &lt;each&gt; entry. [Formulas](tolerances.html#mass)." in text
+    assert "64 eps x L &amp; more, of all." in page and "64 eps x L" not in text and "Rounding" not in page
 
 
 @pytest.mark.parametrize("name, is_said", [("mass", True), ("stability", False)])
@@ -239,9 +234,6 @@ def test_the_answer_to_one_question_has_its_table(folder, monkeypatch):
     sections = [section("stability", GOOD), section("mass", GOOD)]
     sections[0].result.top = [Finding("odd", "said")]
     alone, both = (Document(report_of(folder, few)).text() for few in (sections[:1], sections))
-    assert (
-        "| way | what |" in alone
-        and "| a | &lt;b&gt; |" in alone
-        and alone.index("Use 2.") < alone.index("And more.")
-    )
+    assert "| way | what |" in alone and "| a | &lt;b&gt; |" in alone
+    assert alone.index("Use 2.") < alone.index("And more.")
     assert "| way |" not in both and "Use 2. And more." in both

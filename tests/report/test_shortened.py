@@ -194,13 +194,6 @@ def test_what_nobody_foresaw_is_one_line(tmp_path):
 
 def test_rows_of_a_table_are_aligned_after_an_empty_line():
     rows = [["model", "error", "< remark"], ["the file", "-"], ["x", "0.28 mm", "the same bits"]]
-    expected = [
-        "",
-        " model        error   remark",
-        " the file         -",
-        " x          0.28 mm   the same bits",
-    ]
-    assert [" ".join(line.split()) for line in aligned(rows)] == [" ".join(line.split()) for line in expected]
-    lines = aligned(rows)
-    assert len({line.index(word) + len(word) for line, word in zip(lines[1:], ("error", "-", "mm"))}) == 1
-    assert lines[1].index("remark") == lines[3].index("the same bits") and aligned([]) == []
+    assert aligned(rows) == [
+        "", " model        error   remark", " the file         -", " x          0.28 mm   the same bits"
+    ]  # fmt: skip

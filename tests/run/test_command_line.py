@@ -161,12 +161,8 @@ def test_a_robot_that_is_not_stable_at_its_own_step_agrees_and_fails(inside, tmp
     assert main(words) == 1
     lines = capsys.readouterr().out.splitlines()
     empty, first, *_, last = lines
-    assert (
-        not empty
-        and first.startswith('Not stable: 2 ms with Euler, from "qpos0"')
-        and last.startswith("Report: ")
-    )
-    assert len(lines) <= 13
+    assert not empty and first.startswith('Not stable: 2 ms with Euler, from "qpos0"')
+    assert last.startswith("Report: ") and len(lines) <= 13
     report = (out / "report.md").read_text(encoding="utf-8")
     assert 0 < report.index("Not stable") < report.index("0 of 1 check")
     results = results_in(out)

@@ -198,21 +198,12 @@ def test_short_experiments_come_first_and_timed_ones_last_and_are_drawn_last(tmp
         assert [figure.file for figure in section_of_name.figures] == [f"{name}_{k}" for k in range(3)]
 
 
-def test_an_experiment_under_way_is_not_finished_although_it_has_rows(tmp_path):
+def test_after_an_interrupt_there_is_what_has_ended_with_the_figures_that_are_drawn(tmp_path):
     (tmp_path / "figures").mkdir()
     setup = SimpleNamespace(own=None, robot=ARM, is_quick=False, alone=True, options=Options())
-    run = experiment.Run(["mass", "gravity"], setup, tmp_path, Terminal(), None, Clock())
-    run.sections += [section("mass", GOOD), section("gravity", GOOD)]
-    run.clock.ends("mass")
-    assert [one.name for one in run.finished().sections] == ["mass"]
-
-
-def test_after_an_interrupt_there_are_the_figures_that_are_drawn_and_no_others(tmp_path):
-    (tmp_path / "figures").mkdir()
-    setup = SimpleNamespace(own=None, robot=ARM, is_quick=False, alone=True, options=Options())
-    names = ["mass", "gravity", "acceleration"]
+    names = ["mass", "gravity", "acceleration", "speed"]
     run = experiment.Run(names, setup, tmp_path, Terminal(), None, Clock())
-    drawn, broken, under_way = (Future() for _ in names)
+    drawn, broken, under_way = (Future() for _ in names[:3])
     drawn.set_result([experiment.Figure("mass", "A caption.")])
     broken.set_exception(ValueError("no room"))
     for name, drawing in zip(names, (drawn, broken, under_way)):
@@ -220,6 +211,7 @@ def test_after_an_interrupt_there_are_the_figures_that_are_drawn_and_no_others(t
         run.clock.ends(name)
         run.drawings.append((run.sections[-1], drawing))
         (tmp_path / "figures" / f"{name}.png").touch()
+    run.sections.append(section("speed", GOOD))  # which has rows, and has not ended
     sections = run.finished().sections
     assert [[figure.file for figure in part.figures] for part in sections] == [["mass"], [], []]
     assert [path.name for path in (tmp_path / "figures").iterdir()] == ["mass.png"]
