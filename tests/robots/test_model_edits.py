@@ -114,12 +114,10 @@ def test_contacts_are_a_cause_if_geoms_touch_in_a_scene_or_at_a_random_state():
     (cause,) = parameters.rows(replace(setup, robot=replace(ARM, scenes=()))).causes
     assert " at q = (" in cause.text and "zero, free" not in cause.text
     beneath = TOUCHING.replace(STAGES_OFF, "").replace(FLOOR.format(-0.3), FLOOR.format(-0.7))
-    result = parameters.rows(setup_of(beneath, make=Setup, states=20))
-    assert result.causes == [] and "nothing_touches" in [note.kind for note in result.notes]
+    assert found(beneath) == (set(), [])
 
 
 FINGERTIP = FOREARM.replace("0.15", "0.225").replace("1.5", "1.2")
-IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3 0 0" size="0.03"/>'
 
 
 @pytest.mark.parametrize("edits, place, numbers", [
@@ -134,8 +132,6 @@ IN_GEOMS = '<compiler angle="radian"/>', '<geom type="capsule" fromto="0 0 0 0.3
     ([("0 0 -9.81", "0 -9.81 0")], "gravity", "(0, -9.81, 0) m/s2 in arm.xml, (0, 0, -9.81) m/s2 in arm"),
     ([(BETA + ' axis="1 0 0"', BETA + ' axis="0 0 1"')], "axis of beta", "(0, 0, 1) in arm.xml, (1, 0, 0) in arm"),
     ([(FOREARM, FINGERTIP)], "forearm", "mass 1.2 kg, com x 0.225 m in arm.xml; mass 1.5 kg, com x 0.15 m in arm"),
-    ([(FOREARM, IN_GEOMS[1]), ('<compiler angle="radian" inertiafromgeom="false"/>', IN_GEOMS[0])],
-     "forearm", "arm.xml has no inertial"),
 ])  # fmt: skip
 def test_numbers_of_a_body_and_numbers_that_differ_alike_are_one_cause(edits, place, numbers):
     (cause,) = found(edited(*edits))[1]

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -13,7 +13,7 @@ import tmt
 from ...core.check import Result
 from ...core.finding import Finding
 from ...core.text import block
-from ...engines.mujoco import Mujoco, Reading
+from ...engines.mujoco import Reading
 from ...engines.mujoco.dynamics import MujocoDynamics
 from ...engines.mujoco.inventory import LEFT_OUT, MODELLED
 from ...engines.mujoco.parameters import STATED_FLAGS, Stated, lengths, parameters, stated_numbers
@@ -23,7 +23,6 @@ from ...robots.coordinates import Coordinates
 from ...robots.placement import places_of
 from ..setup import Setup
 from .causes import causes_of
-from .contacts import touches
 from .numbers import (
     ABSENT,
     OF_BODIES,
@@ -39,12 +38,22 @@ from .numbers import (
 )
 
 SHOWN = ["of", "quantity", "component", "stated", "compiled", "unit"]
+FINER = 8  # steps in one of the scene, in which contacts are looked for
 # numbers of the whole file; the others are of bodies and joints
 OF_WORLD = (*STATED_FLAGS, "gravity", "density", "viscosity", "other mass", "tendon armature", *ABSENT)
 # these act at some states only: causes come after those that always act
 AT_TIMES = ("limited", "contact pairs")
 # the equations of motion without them do not depend on these
 MAY_DIFFER = ("contact", "limit", "clamp", "actuator")
+
+
+class Touch(NamedTuple):
+    """Two geoms that touch."""
+
+    geoms: tuple[str, str]
+    scene: str  # "": at a random state alone
+    time: float  # s, the first in that scene
+    q: list[float]  # rad
 
 
 def rows(setup: Setup) -> Result:
@@ -74,8 +83,6 @@ def rows(setup: Setup) -> Result:
         result.tables["inventory"] = [FeatureRow.of(feature) for feature in robot.features]
     else:
         compared += forces
-        if dynamics.may_touch and not touching:
-            result.find("nothing_touches", states=len(setup.random.q))
     if is_of_file:
         for name, value, unit in (("integrator", reading.integrator, ""), ("timestep", reading.dt, "s")):
             result.rows.append(NumberRow(of="file", quantity=name, compiled=value, unit=unit))
@@ -83,20 +90,29 @@ def rows(setup: Setup) -> Result:
     texts = {"contact pairs": block("parameters", "touching", touching=touching[:3])} if touching else {}
     if extra := dynamics.additional_bodies():
         texts["other mass"] = block("parameters", "additional", bodies=extra)
-    causes = causes_of(compared, sides, () if is_of_file else without_inertial(setup, dynamics))
-    causes = [replace(cause, text=texts.get(cause.quantity, cause.text)) for cause in causes]
+    causes = [
+        replace(cause, text=texts.get(cause.quantity, cause.text)) for cause in causes_of(compared, sides)
+    ]
     result.causes = sorted(causes, key=lambda cause: (cause.rank, cause.quantity in AT_TIMES, -cause.size))
     return result
 
 
-def without_inertial(setup: Setup, dynamics: MujocoDynamics) -> list[str]:
-    """The bodies, by the robot's names, whose mass is that of geoms: the file states no inertial."""
-    source = setup.engines["mujoco"].source if isinstance(setup.engines["mujoco"], Mujoco) else None
-    if source is None or source.spec is None:
+def touches(setup: Setup, dynamics: MujocoDynamics) -> list[Touch]:
+    """The pairs of geoms that touch, each where it first does: in a scene by MuJoCo, at a random state."""
+    if not dynamics.may_touch:
         return []
-    stated = dict(zip(source.bodies, (body.explicitinertial for body in source.spec.bodies)))
-    names = zip(setup.robot.tree.body_names, dynamics.bodies)
-    return [name for name, body in names if not stated[body] and body not in source.welded.values()]
+    found: dict[tuple[str, str], Touch] = {}
+    for case in setup.robot.cases_of_torque:
+        acting = cast(MujocoDynamics, setup.engines["mujoco"].of(case))
+        motion = acting.run(case.q, case.v, case.tau, case.scene.dt / FINER, case.steps * FINER, "RK4")
+        q = motion.q[np.isfinite(motion.q).all(axis=1)]
+        for time, state, pairs in zip(motion.t.tolist(), q, acting.touching(q)):
+            for pair in pairs - found.keys():
+                found[pair] = Touch(pair, case.name, time, case.positions_of_all(state).tolist())
+    for state, pairs in zip(setup.random.q, dynamics.touching(setup.random.q)):
+        for pair in pairs - found.keys():
+            found[pair] = Touch(pair, "", 0.0, state.tolist())
+    return list(found.values())
 
 
 def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:

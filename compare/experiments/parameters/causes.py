@@ -18,10 +18,8 @@ ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("anchor", "com"))  # qua
 OF_JOINTS = "anchor", "axis", "ref"
 
 
-def causes_of(
-    numbers: Sequence[Compared], sides: Sequence[str], from_geoms: Sequence[str] = ()
-) -> list[Cause]:
-    """The causes of all numbers that differ. sides: the names of here and there; from_geoms: bodies without inertial here."""
+def causes_of(numbers: Sequence[Compared], sides: Sequence[str]) -> list[Cause]:
+    """The causes of all numbers that differ. sides: the names of here and there."""
     left, causes = [number for number in numbers if number.differs.any()], list[Cause]()
 
     def explain(kind: str, together: Sequence[Compared], place: str = "", **values: Any) -> None:
@@ -47,7 +45,7 @@ def causes_of(
         there = ", ".join(number.place for number in every)
         here = ", ".join(number.place for number in sorted(every, key=lambda number: float(number.here[0])))
         explain("order", order, stated=there, explains=here)
-    written = [number for number in left if is_in_six_digits(number)]
+    written = [number for number in left if relative(number) <= SIX_DIGITS]
     if sum(np.count_nonzero(number.differs) for number in written) > 1:
         explain("six_digits", written, most=max(map(relative, written)))
     while left:
@@ -59,14 +57,8 @@ def causes_of(
             continue
         kinds = OF_BODIES if first.quantity in OF_BODIES else OF_JOINTS
         together = [number for number in left if number.place == first.place and number.quantity in kinds]
-        lacks = first.place in from_geoms and len(together) > 1
-        explain("differ", together if first in together else [first], lacks_inertial=lacks)
+        explain("differ", together if first in together else [first])
     return causes
-
-
-def is_in_six_digits(number: Compared) -> bool:
-    """Whether a number here is the one there as far as it is written with six digits."""
-    return relative(number) <= SIX_DIGITS
 
 
 def relative(number: Compared) -> float:
