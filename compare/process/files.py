@@ -81,24 +81,22 @@ def why_not(path: Path, needed: Iterable[Path], reserved: Iterable[Path], mark: 
     needed: files that are never written to. reserved: files and folders that something else replaces. mark: in the
     first line of what may be replaced.
     """
-    rules = {
-        "link": path.is_symlink,
-        "folder": path.is_dir,
-        "no_folder": lambda: not path.parent.is_dir(),
-        "not_regular": lambda: is_pipe(path),
-        "needed": lambda: path.exists() and any(file.exists() and path.samefile(file) for file in needed),
-        "foreign": lambda: path.exists() and not has_mark(path, mark),
-        "read_only": lambda: path.exists() and not os.access(path, os.W_OK),
-        "report": lambda: any(path.resolve().is_relative_to(part.resolve()) for part in reserved),
-        "assets": lambda: os.path.lexists(assets_of(path)) and not assets_of(path).is_dir(),
-    }
+    assets = assets_of(path)
     try:
-        for why, applies in rules.items():
-            if applies():
-                return why
+        is_there = path.is_symlink() or path.exists()
+        if is_there and (path.is_symlink() or not path.is_file()):
+            return "not_regular"
+        if is_there and any(file.exists() and path.samefile(file) for file in needed):
+            return "needed"
+        if is_there and not has_mark(path, mark):
+            return "foreign"
+        if any(path.resolve().is_relative_to(part.resolve()) for part in reserved):
+            return "report"
+        if os.path.lexists(assets) and not assets.is_dir():
+            return "assets"
         with tempfile.TemporaryFile(dir=path.parent):
             return ""
-    except (OSError, ValueError) as error:  # a name that is too long, a folder that is read-only
+    except (OSError, ValueError) as error:  # no such folder, one that is read-only, a name that is too long
         return getattr(error, "strerror", None) or str(error)
 
 

@@ -64,7 +64,9 @@ def test_what_the_model_needs_is_never_written_to(robot, part, kind):
         (robot.parent / "linked").symlink_to(needed.parent)
         path = robot.parent / "linked" / needed.name
     refused = answer(robot, needed if kind == "itself" else path)
-    assert ("it is a link" if kind == "link" else "the model needs this file") in refused
+    assert (
+        "it is a link, a folder or a device" if kind == "link" else "the model needs this file"
+    ) in refused
     assert needed.read_bytes() == before
 
 
@@ -93,9 +95,9 @@ def test_places_where_nothing_can_be_written_are_refused(robot, monkeypatch):
     (folder / "small_assets").touch()
     (folder / "report").mkdir()
     for name, why in (
-        ("nowhere.xml", "a link"), ("pipe.xml", "a pipe"), ("none/small.xml", "no such folder"), ("parts", "it is a folder"),
+        ("nowhere.xml", "a link"), ("pipe.xml", "a device"), ("none/small.xml", "No such file"), ("parts", "a folder"),
         ("small.xml", "small_assets beside it is no folder"), ("report/report.md", "files of the report"),
-        ("report/tables/small.xml", "no such folder"), (f"{'x' * 300}.xml", "too long"),
+        ("report/tables/small.xml", "files of the report"), (f"{'x' * 300}.xml", "too long"),
         ("report/small.xml", ""), ("new.xml", ""),
     ):  # fmt: skip
         refused = answer(robot, folder / name)
