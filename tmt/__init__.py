@@ -1,19 +1,16 @@
 """Equations of motion of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
 
-Stands alone: needs NumPy, llvmlite and mpmath, and knows nothing of any physics engine. The first argument of
-every function is the model, a Tree; `tmt.ARM` is the assignment's arm. States have any leading batch shape,
-one array for each, which broadcast. ValueError, in one line, for wrong shapes, values that are not finite,
-unknown names, a singular Mbar and results beyond the largest double.
+The first argument of every function is the model, a Tree; `tmt.ARM` is the assignment's arm. States have any
+leading batch shape, one array for each, which broadcast. ValueError, in one line, for wrong shapes, values that
+are not finite, unknown names, a singular Mbar and results beyond the largest double. No physics engine is needed.
 
 Shapes: q (..., nq), qd and tau (..., nv). Of a hinge or slide one number each, of a ball four (a quaternion
-w, x, y, z of length 1) and three (angular velocity in its own axes, and torque): nq = nv, where no joint is a
-ball.
+w, x, y, z of length 1) and three (angular velocity in its own axes, and torque).
 
 Units: rad, s, kg, m, N m, J; of a slide m and N. Frames: the inertial frame, of the arm at the shoulder, x
 north, y west, z up; "body axes" are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd,
-with h = `bias` (MuJoCo's qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq, the torque that
-holds a model at rest where no springs act. In MuJoCo's names tau is qfrc_applied, qdd is qacc, and joint
-damping and springs are in qfrc_passive.
+with h = `bias` (MuJoCo's qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq. In MuJoCo's names tau
+is qfrc_applied, qdd is qacc, and joint damping and springs are in qfrc_passive.
 
     import numpy as np, tmt
 
@@ -33,10 +30,9 @@ Methods of `simulate`: "rk4"; "semi_implicit_euler", "implicit", "implicitfast" 
 steps of its own); "implicit_midpoint" and "gauss_legendre_4", which no linear motion can make unstable; and
 "taylor", the true motion.
 
-NumPy (literal.py) answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all
-calls of a model, which suits loops over single states; see answers.py. Both differ in the last bits, and say
-what is wrong in the same words. Compiled code is kept on disk, see compiled/store.py. Without MuJoCo,
-`pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
+NumPy answers calls of up to 500 states, compiled code larger ones and, after `prepare`, all calls of a model,
+which suits loops over single states. Both differ in the last bits. Compiled code is kept on disk, see
+compiled/store.py. Without MuJoCo, `pip install numpy llvmlite mpmath && pip install --no-deps .` is enough.
 """
 
 from tmt.answers import prepare

@@ -41,7 +41,6 @@ def documented(function: Function) -> Function:
     before, mark, examples = text.partition("\n\n>>> ")
     shared = f"""
 Raises ValueError for wrong shapes, values that are not finite,{solved} results beyond the largest double.
-
 Parameters
 ----------
 {", ".join((model, *states))} : Tree, {shapes}; {units}, of slides {of_slides}, of balls q is w, x, y, z"""

@@ -28,7 +28,7 @@ def derivatives(model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Der
     """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd.
 
     Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by
-    qd; dqdd/dtau = Mbar^-1. By q means by movements: of a hinge or slide by its number in q; of a ball by
+    qd; dqdd/dtau = Mbar^-1. By q means by tangent vectors: of a hinge or slide by its number in q; of a ball by
     turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
     three slides and a ball, by the position of its origin in the inertial frame, then by turns in its own
     axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so.
@@ -48,7 +48,7 @@ def inverse_dynamics_derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact derivatives of `inverse_dynamics` by q and by qd.
 
-    By q means by movements, see `derivatives`; the derivative by qdd is `mass_matrix`. MuJoCo: mjd_inverseFD.
+    By q means by tangent vectors, see `derivatives`; the derivative by qdd is `mass_matrix`. MuJoCo: mjd_inverseFD.
 
     Returns
     -------
@@ -65,10 +65,12 @@ def inverse_dynamics_derivatives(
 def step_derivatives(
     model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike, dt: ArrayLike, method: str = "rk4"
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Exact A = dx+/dx and B = dx+/dtau of one step, x = (movement, qd).
+    """Exact A = dx+/dx and B = dx+/dtau of one step, x = (tangent, qd).
 
     The torque is constant during the step. Movements as in `derivatives`: before the step from q, after it
     from the q that it reaches. Of an adaptive method the step is one of its own, of that size.
+    Returns A, B : (..., 2 nv, 2 nv) and (..., 2 nv, nv), SI. Raises ValueError as the other functions, and
+    where an implicit method does not find its stages.
 
     Parameters
     ----------
@@ -77,17 +79,6 @@ def step_derivatives(
     dt : (...), s, above 0
     method : str, a key of METHODS
 
-    Returns
-    -------
-    A, B : (..., 2 nv, 2 nv) and (..., 2 nv, nv), SI
-
-    Raises
-    ------
-    ValueError
-        As the other functions, and where an implicit method does not find its stages.
-
-    Examples
-    --------
     >>> A, B = tmt.step_derivatives(tmt.ARM, [0.0, 0.0, np.pi / 2], [0.0] * 3, [0.0] * 3, 0.01, "implicit")
     >>> print(A.shape, B.shape, A[2, 5].round(9))  # dq+ = dt dqd+
     (6, 6) (6, 3) 0.01

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,23 +36,13 @@ class Motion(_Path):
     ended : str, None, or array of them in the shape of the batch: when and why a run ended early
     evaluations : int, of the dynamics, of all runs; those of an implicit method with their Jacobian
 
-    Examples
-    --------
     >>> motion = tmt.simulate(tmt.ARM, [0.0] * 3, [0.0] * 3, [0.0] * 3, dt=0.01, steps=10)
     >>> print(motion.ended, motion.evaluations)  # four stages in each step
     None 40
     """
 
-    ended: str | np.ndarray | None
-    evaluations: int
-
-    def __new__(cls, t: Array, q: Array, qd: Array, ended: str | Array | None, evaluations: int) -> Motion:
-        motion = super().__new__(cls, t, q, qd)
-        motion.ended, motion.evaluations = ended, evaluations
-        return motion
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (*self, self.ended, self.evaluations)
+    ended: str | np.ndarray | None = None
+    evaluations: int = 0
 
 
 def simulate(
@@ -75,16 +65,11 @@ def simulate(
         Any other is asked at each stage, of a method with fixed steps that solves nothing.
     dt : float, s, step, above 0
     steps : int, how many, at least 1
-    method : str, a key of METHODS, or "taylor": the true motion, rounded once
-        That is a Taylor series in pairs of doubles, whose evaluations are its steps. An adaptive method takes
-        its own steps between those.
-    tolerance : float, default 1e-9, of "taylor" 1e-33
-        Of adaptive methods: the error of each step, in units of 1 + |value|.
-    every : int, default 1
-        Every n-th state alone is kept, n a divisor of steps: records = steps / every + 1.
+    method : str, a key of METHODS, or "taylor": the true motion, rounded once, by a series in pairs of doubles
+        Its evaluations are its steps. An adaptive method takes its own steps between those.
+    tolerance : float, of adaptive methods: the error of each step, in units of 1 + |value|; 1e-9, of "taylor" 1e-33
+    every : int, a divisor of steps: every n-th state alone is kept, records = steps / every + 1
 
-    Examples
-    --------
     >>> start = np.array([0.5, 0.3, 1.0])
     >>> t, q, qd = tmt.simulate(tmt.ARM, start, [0.0] * 3, tmt.gravity_balance(tmt.ARM, start), dt=0.01, steps=100)
     >>> print(t[-1], q.shape, abs(q - start).max() < 1e-12)  # it is held
@@ -97,9 +82,7 @@ def simulate(
     stepping = runner.stepping
     steps, every = values.whole("steps", steps), values.whole("every", every)
     dt = values.positive("dt", dt, "a step in s")
-    if steps % every:
-        why = f"of which steps = {shown(steps)} is no multiple"
-        raise ValueError(f"every is {shown(every)}, {why}; a divisor is expected")
+    values.require(steps % every == 0, "every", every, f"a divisor of steps = {shown(steps)} is")
     if tolerance is not None and not stepping.adaptive:
         raise ValueError(f"method {method!r} has a fixed step and takes no tolerance")
     usual = 1e-33 if taylor else 1e-9
@@ -127,7 +110,9 @@ def simulate(
         ended, evaluations = in_blocks(runner, path_q, path_qd, torque, dt, tolerance, every)
     t = dt * np.arange(0, steps + 1, every)
     q, qd = (path.reshape(*batch, *path.shape[1:]) for path in (path_q, path_qd))
-    return Motion(t, q, qd, ended.reshape(batch)[()], evaluations)
+    motion = Motion(t, q, qd)
+    motion.ended, motion.evaluations = ended.reshape(batch)[()], evaluations
+    return motion
 
 
 def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int, tolerance: float) -> Ended:

@@ -88,14 +88,14 @@ def test_a_spring_at_any_turn_has_its_torque_energy_and_derivatives(kind, tmp_pa
         pytest.importorskip("jax").config.update("jax_enable_x64", True)
     values = TYPES[kind](tmp_path)
     for angle, axis in product_of(TURNS, AXES):
-        torque, energy, by_movement = expected(angle, axis)
+        torque, energy, by_tangent = expected(angle, axis)
         q = turned(angle, axis)
         states = [q], [q], [q, Z, Z]
         calls = zip(QUANTITIES, states)
         found = [np.array(values(name, *state), dtype=float) for name, state in calls]
         assert np.abs(found[0] - torque).max() <= 1e-14
         assert abs(found[1] - energy).max() <= 4e-14
-        assert np.abs(found[2][0] - by_movement).max() <= 1e-13 and not found[2][1].any()
+        assert np.abs(found[2][0] - by_tangent).max() <= 1e-13 and not found[2][1].any()
 
 
 @pytest.mark.parametrize("angle", TURNS)

@@ -29,7 +29,7 @@ def model(name):
 
 
 def differences(tree, function, q, qd, tau):
-    """The derivative of a function of (q, qd, tau) by movements, speeds and torques, (..., 3 nv), by differences of order 8."""
+    """The derivative of a function of (q, qd, tau) by tangent vectors, speeds and torques, (..., 3 nv), to order 8."""
     n = len(tree.axis)
     columns = []
     for direction in np.eye(3 * n):

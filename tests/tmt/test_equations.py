@@ -32,13 +32,13 @@ def of_trees(test):
 
 
 def along(tree, function, q, u):
-    """The rate of a function of q along the movement u."""
+    """The rate of a function of q along the tangent u."""
     ahead, behind = (np.array(tree.coordinates.move(list(q), list(h * u))) for h in (STEP, -STEP))
     return (function(ahead) - function(behind)) / (2.0 * STEP)
 
 
 def by_each(tree, function, q):
-    """The derivative of a function of q by each movement, in the last axis."""
+    """The derivative of a function of q by each tangent, in the last axis."""
     return np.stack([along(tree, function, q, u) for u in np.eye(len(tree.axis))], axis=-1)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from tmt.derivation.quantities import is_quantity, quantity_of, shape_of, what_is_known
 from tmt.model.tree import Tree, checked_model
-from tmt.model.values import shown
+from tmt.model.values import require
 
 from .cores import cores, in_threads
 
@@ -34,8 +34,7 @@ class Evaluator:
 
     def __init__(self, tree: Tree, quantity: str):
         checked_model(tree)
-        if not is_quantity(quantity):
-            raise ValueError(f"quantity is {shown(quantity)}; {what_is_known(quantity)}")
+        require(is_quantity(quantity), "quantity", quantity, what_is_known(quantity))
         self.tree, self.quantity = tree, quantity
         self.shapes = [(tree.nq,), (tree.nv,), (tree.nv,), (1,)]
         self.shape, self.has_parts = shape_of(quantity, tree), bool(quantity_of(quantity).parts)

@@ -2,10 +2,10 @@
 
 A hinge has an angle and its rate, a slide a length and its rate. A ball has a quaternion (w, x, y, z), which
 turns components in its own frame to components in that of its parent, and three speeds: its angular velocity
-in its own frame. So q has nq numbers and qd has nv. A movement u is as a speed that acts for a unit of time:
+in its own frame. So q has nq numbers and qd has nv. A tangent vector u is as a speed that acts for a unit of time:
 nv numbers.
 
-For a ball the position after a movement is p o exp(u / 2), o being the product of quaternions. Along a motion
+For a ball the position after a tangent is p o exp(u / 2), o being the product of quaternions. Along a motion
 that starts at p, u changes by ud = dexp^-1(u) omega (Hairer, Lubich, Wanner, Geometric Numerical Integration,
 IV.8), here for u that turns with the body: omega + u x omega / 2 + c u x (u x omega), c = (1 - (s / 2) cot(s
 / 2)) / s^2, s = |u|.
@@ -15,7 +15,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
-from .vectors import Scalars, Values, Vector, cos, plus, sign, sin, sqrt
+from .vectors import Scalars, Values, Vector, cos, minus, plus, sign, sin, sqrt
 
 KINDS = {"hinge": (1, 1), "slide": (1, 1), "ball": (4, 3)}  # how many numbers of q and of qd
 HALVINGS = 4  # of a turn of at most pi rad: then the sine of its half is below 0.1
@@ -60,21 +60,15 @@ class Coordinates(NamedTuple):
         return result
 
     def move(self, q: Scalars, u: Scalars) -> Values:
-        """The position after a movement u from q, quaternions of length 1."""
+        """The position after a tangent u from q, quaternions of length 1."""
         return self.by_joint(lambda p, u: normalized(product(p, exponential(u))), plus, q, u, "q", "qd")
 
     def difference(self, q1: Scalars, q0: Scalars) -> Values:
-        """The movement from q0 to q1, (nv,): of a ball the shortest."""
-        movement: Values = []
-        for joint in self.joints:
-            if joint.kind == "ball":
-                movement += logarithm(product(conjugate(q0[joint.q]), q1[joint.q]))
-            else:
-                movement.append(q1[joint.q.start] - q0[joint.q.start])
-        return movement
+        """The tangent from q0 to q1, (nv,): of a ball the shortest."""
+        return self.by_joint(lambda p, p0: logarithm(product(conjugate(p0), p)), minus, q1, q0, "q", "q")
 
     def tangent(self, q: Scalars, dq: Scalars) -> Values:
-        """The movement that changes q by small dq, linear in dq."""
+        """The tangent that changes q by small dq, linear in dq."""
 
         def of_ball(p: Scalars, dp: Scalars) -> Values:
             return [2.0 * x for x in product(conjugate(p), dp)[1:]]
@@ -92,8 +86,8 @@ class Coordinates(NamedTuple):
     def rates(self, u: Scalars, qd: Scalars) -> Values:
         """du/dt at speeds qd, of a motion that has moved by u."""
 
-        def of_ball(movement: Scalars, speeds: Scalars) -> Values:
-            u, omega = Vector(*movement), Vector(*speeds)
+        def of_ball(tangent: Scalars, speeds: Scalars) -> Values:
+            u, omega = Vector(*tangent), Vector(*speeds)
             half = sqrt(u.dot(u) + TINY) * 0.5
             share = (1.0 - half * cos(half) / sin(half)) / (half * half) * 0.25
             once = u.cross(omega)
@@ -136,7 +130,7 @@ def normalized(p: Scalars) -> Values:
 
 
 def logarithm(p: Scalars) -> Values:
-    """The movement u, |u| at most pi rad, with exponential(u) = p / |p| or -p / |p|; of w = 0 that with p.
+    """The tangent u, |u| at most pi rad, with exponential(u) = p / |p| or -p / |p|; of w = 0 that with p.
 
     No root of what vanishes, so that it has derivatives everywhere: the turn is halved, sin(a / 2) = sin(a) /
     (2 cos(a / 2)), until the series of the arc sine takes it, arcsin x = x (1 + x^2 / 6 (1 + ...)).

@@ -1,6 +1,6 @@
-"""How Mbar qdd + h changes with movements and speeds: in closed form, in world axes as in articulated.py.
+"""How Mbar qdd + h changes with tangent vectors and speeds: in closed form, in world axes as in articulated.py.
 
-A movement along the direction S_k = (axis, shift) of a speed takes all that its joint carries along as one
+A step along the direction S_k = (axis, shift) of a speed takes all that its joint carries along as one
 body, and so turns velocity and acceleration of what is carried, less those of the frame before (omega, u of
 its point at O, omegad, ud). What is left are two motions, with x the product of motions, (omega, u) x (axis,
 shift) = (omega x axis, omega x shift + u x axis):
@@ -15,7 +15,7 @@ the mass at a point r feels 2 X_omega x its velocity, so that
 With I, B and the force F of all that the joint carries, and Y + W = v x S + v_own x S, its moment and force
 change by
 
-    I Z + B Y + S x* F  with the movement        I (Y + W) + B S  with the speed,
+    I Z + B Y + S x* F  with the tangent        I (Y + W) + B S  with the speed,
 
 along each direction inward; of the torque at joints outward by I Z + B Y and I (Y + W) + B S, with their own
 I and B. Sums of this kind, over six coordinates: Singh, Russell, Wensing, IEEE Robotics and Automation
@@ -63,7 +63,7 @@ def velocities(tree: Mechanism, frames: list[Frame], qd: Scalars) -> list[Screw]
 
 
 def rates(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars, number: Round = float) -> tuple[Rows, Rows]:
-    """Derivatives of Mbar qdd + h by movements of q (of a ball turns in its axes) and qd, (nv, nv) each."""
+    """Derivatives of Mbar qdd + h by tangent vectors of q (of a ball turns in its axes) and qd, (nv, nv) each."""
     n, joints = len(qd), tree.coordinates.joints
     frames, own = outward(tree, q, qd, qdd, number)
     rigid, v = gathered(tree, own), velocities(tree, frames, qd)
@@ -81,7 +81,7 @@ def rates(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars, number: Round 
             Y.append(v0.times(S[k]))
             Z.append(combined(a0.times(S[k]), v0.times(Y[k])))
             YW.append(combined(Y[k], v[i].times(S[k])))
-    by_movement: Rows = [[0.0] * n for _ in range(n)]
+    by_tangent: Rows = [[0.0] * n for _ in range(n)]
     by_speed: Rows = [[0.0] * n for _ in range(n)]
     for i, body in enumerate(rigid):
         path = [k for inward in tree.path(tree.parent[i]) for k in joints[inward].speeds]
@@ -91,14 +91,14 @@ def rates(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars, number: Round 
             moved = combined(body.accelerated(Z[k]), B[i].force(Y[k].angular))
             sped = combined(body.accelerated(YW[k]), B[i].force(S[k].angular))
             for other in joints[i].speeds:
-                by_movement[other][k] = moved.dot(S[other])
+                by_tangent[other][k] = moved.dot(S[other])
                 by_speed[other][k] = sped.dot(S[other])
             (axis, shift), (moment, force) = S[k], body.force
             turned = Screw(axis.cross(moment) + shift.cross(force), axis.cross(force))
             moved = combined(moved, turned)
             for other in path:
-                by_movement[other][k] = moved.dot(S[other])
+                by_tangent[other][k] = moved.dot(S[other])
                 by_speed[other][k] = sped.dot(S[other])
-                by_movement[k][other] = inertia.dot(Z[other]) + by_turn.dot(Y[other].angular)
+                by_tangent[k][other] = inertia.dot(Z[other]) + by_turn.dot(Y[other].angular)
                 by_speed[k][other] = inertia.dot(YW[other]) + by_turn.dot(S[other].angular)
-    return by_movement, by_speed
+    return by_tangent, by_speed

@@ -16,7 +16,7 @@ Numbers = tuple[float, ...]
 Rows = tuple[Numbers, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, match_args=False)
 class Mechanism:
     """The fields of `tmt.Tree`, which says what they are, in any type of number and unchecked."""
 

@@ -209,13 +209,13 @@ def bias_rates(tree: Mechanism, q: Scalars, qd: Scalars, terms: Terms = mass_mat
 
 
 def from_rest(tree: Mechanism, q: Scalars) -> list[tuple[Scalar, Scalar]]:
-    movement = tree.coordinates.difference(q, tree.rest)
+    tangent = tree.coordinates.difference(q, tree.rest)
     joints = zip(tree.stiffness, tree.coordinates.joints)
-    return [(stiffness, movement[k]) for stiffness, joint in joints for k in joint.speeds]
+    return [(stiffness, tangent[k]) for stiffness, joint in joints for k in joint.speeds]
 
 
 def spring_torque(tree: Mechanism, q: Scalars) -> Values:
-    """k (q - rest) (nv, N m or N), which springs take off; of a ball k times the movement from its rest."""
+    """k (q - rest) (nv, N m or N), which springs take off; of a ball k times the tangent from its rest."""
     if not tree.has_springs:
         return [0.0] * len(tree.axis)
     return [stiffness * x for stiffness, x in from_rest(tree, q)]

@@ -77,23 +77,23 @@ class State:
 
     @property
     def force_rates(self) -> Rates:
-        """Derivatives of Mbar qdd + h by movements of q and by qd, (nv, nv) each."""
+        """Derivatives of Mbar qdd + h by tangent vectors of q and by qd, (nv, nv) each."""
         if self.form.rates is None:
-            by_movement = self.by_movement(lambda q: self.force(q, self.qd))
-            return by_movement, jacobian(lambda qd: self.force(self.q, qd), list(self.qd))
+            by_tangent = self.by_tangent(lambda q: self.force(q, self.qd))
+            return by_tangent, jacobian(lambda qd: self.force(self.q, qd), list(self.qd))
         return self.form.rates(self.tree, self.q, self.qd, self.qdd)
 
     @cached_property
     def torque_rates(self) -> Rates:
-        by_movement, by_speed = self.force_rates
+        by_tangent, by_speed = self.force_rates
         nothing, qd = [0.0] * len(self.qd), list(self.qd)
         if self.tree.has_springs or self.tree.position_gain:
-            pulled = self.by_movement(lambda q: method.inverse_dynamics(self.tree, q, qd, nothing))
-            by_movement = added(by_movement, pulled)
+            pulled = self.by_tangent(lambda q: method.inverse_dynamics(self.tree, q, qd, nothing))
+            by_tangent = added(by_tangent, pulled)
         damped = method.with_diagonal(self.tree.speed_gain, self.tree.damping)
-        return by_movement, added(by_speed, damped)
+        return by_tangent, added(by_speed, damped)
 
-    def by_movement(self, function: Callable[[Values], Values]) -> Rows:
+    def by_tangent(self, function: Callable[[Values], Values]) -> Rows:
         moved = [self.tree.coordinates.component_rates(self.q, u) for u in unit_vectors(len(self.qd))]
         return jacobian(function, list(self.q), moved)
 
@@ -122,7 +122,7 @@ class State:
 
     @property
     def step_derivatives(self) -> Rows:
-        """[A B], (2 nv, 3 nv): the state after a step by that before it (movement, qd) and by the torque."""
+        """[A B], (2 nv, 3 nv): the state after a step by that before it (tangent, qd) and by the torque."""
         assert self.step is not None
         step, coordinates, dt = self.step, self.tree.coordinates, self.given["dt"][0]
         nq, n, nothing = len(self.q), len(self.qd), [0.0] * len(self.q)
@@ -209,7 +209,7 @@ QUANTITIES = {
     ),
     "step_derivatives": Quantity(
         (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True, solves=True,
-        title="[A B] (2 nv, 3 nv) of one step, A = dx+/dx beside B = dx+/dtau, x = (movement, qd), dt in s.",
+        title="[A B] (2 nv, 3 nv) of one step, A = dx+/dx beside B = dx+/dtau, x = (tangent, qd), dt in s.",
     ),
 }  # fmt: skip
 PLAIN = tuple(name for name, quantity in QUANTITIES.items() if not quantity.argument)  # that need no argument
@@ -227,8 +227,8 @@ def is_quantity(name: object) -> bool:
 
 def what_is_known(name: object) -> str:
     if isinstance(name, str) and name in QUANTITIES:
-        return f"the name of a {QUANTITIES[name].argument} is expected after a colon, {name}:NAME"
-    return f"known are {', '.join(PLAIN)}"
+        return f"{name}:NAME, with the name of a {QUANTITIES[name].argument}, is"
+    return f"one of {', '.join(PLAIN)} is"
 
 
 def argument_of(name: str) -> str:

@@ -14,7 +14,7 @@ from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.quantities import QUANTITIES, is_quantity, quantity_of, shape_of, what_is_known
 from tmt.derivation.vectors import Values
 from tmt.model.tree import Tree, checked_model, stated
-from tmt.model.values import positive, shown
+from tmt.model.values import positive, require, shown
 
 from . import c, jax, scripts
 from .parameters import OF_BODIES, Parameters
@@ -67,46 +67,54 @@ def equations(
         states as columns; a casadi.Function for each quantity; JAX, any batch. The last three are simplified,
         with a symbol for each parameter, for some six hinges and slides (needs SymPy).
     quantities : functions of this package, by name; with symbols mass_matrix, bias, gravity_balance.
-        Of a step [A B], as "step_derivatives:rk4"; of a frame "frame_pose:hand", "frame_jacobian:hand" and
-        "frame_convective:hand".
+        As in `prepare` "step_derivatives:rk4", [A B] of a step, and "frame_pose:hand" and so on.
     name : of the file, which begins the names of C functions.
     single : float in C.
     head : lines that begin the comment at its head.
-    parameters : numbers that are further arguments of each function
-        "gravity" (3,); a body's name, or with ".mass" (1,), ".com" (3,) or ".inertia" (6,) after it;
+    parameters : numbers that are further arguments of each function: "gravity" (3,); a body's name, or with
+        ".mass" (1,), ".com" (3,) or ".inertia" (6,), xx yy zz xy xz yz about the centre of mass, after it;
         "payload" and then a body's name: what that carries besides. They are in the frame that is the site of
-        the body's name on its joint, else in that of its joint; inertias are about the centre of mass: xx yy
-        zz xy xz yz.
-    limit : s
-        With symbols: the most work, counted as that of one processor core; ValueError beyond.
+        the body's name on its joint, else in that of its joint.
+    limit : s, with symbols the most work, counted as that of one processor core; ValueError beyond.
 
-    Examples
-    --------
     >>> print(tmt.equations(tmt.ARM, language="python", quantities=["gravity_balance"]).splitlines()[-1].strip())
     return out.reshape([*batch, 3])
     """
     checked_model(model)
     known = [*LANGUAGES, *SYMBOLIC]
-    if not isinstance(language, str) or language not in known:
-        raise ValueError(f"language is {shown(language)}; expected one of {', '.join(known)}")
-    chosen = checked_quantities(quantities, OF_SYMBOLS if language in SYMBOLIC else ())
-    if not isinstance(head, list | tuple) or not all(isinstance(line, str) for line in head):
-        raise ValueError(f"head is {shown(head)}; a sequence of lines is expected")
-    is_name = isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name)
-    if not is_name or is_word(name):
-        expected = "an identifier, no word of C, Python or MATLAB and no quantity"
-        raise ValueError(f"name is {shown(name)}; expected {expected}")
-    if not isinstance(single, bool) or (single and language not in ("c", "c header")):
-        expected = f"single precision is True or False, and in C only (not in {language})"
-        raise ValueError(f"single is {shown(single)}; {expected}")
-    if not isinstance(parameters, list | tuple) or not all(isinstance(word, str) for word in parameters):
-        raise ValueError(f"parameters is {shown(parameters)}; a sequence of words is expected")
+    require(
+        isinstance(language, str) and language in known, "language", language, f"one of {', '.join(known)} is"
+    )
+    is_symbolic, in_c = language in SYMBOLIC, language in ("c", "c header")
+    chosen = checked_quantities(quantities, OF_SYMBOLS if is_symbolic else ())
+    for word, values in (("head", head), ("parameters", parameters)):
+        are_texts = isinstance(values, list | tuple) and all(isinstance(text, str) for text in values)
+        require(are_texts, word, values, "a sequence of texts is")
+    is_name = isinstance(name, str) and re.fullmatch("[A-Za-z][A-Za-z0-9_]{0,62}", name) and not is_word(name)
+    require(is_name, "name", name, "an identifier, no word of C, Python or MATLAB and no quantity, is")
+    in_single = isinstance(single, bool) and (in_c or not single)
+    require(
+        in_single, "single", single, f"True (single precision) in C alone, not in {language}, or False is"
+    )
     limit = positive("limit", limit, "a number of seconds")
-    arguments = checked_parameters(model, language, chosen, parameters)
+    arguments = Parameters(model, parameters)
+    require(
+        not (parameters and is_symbolic),
+        "parameters",
+        parameters,
+        f"none in {language}, of symbols alone, are",
+    )
+    of_bodies = arguments.has_payload and OF_BODIES.intersection(chosen)
+    require(not of_bodies, "quantity", of_bodies, "no row for each body, of which a payload has none, is")
     lines = [line for text in head for line in text.splitlines() or [""]]  # a comment each
     lines += ["", *conventions(model)]
-    if language in SYMBOLIC:
-        return symbolic_text(model, language, chosen, lines, limit)
+    if is_symbolic:
+        try:
+            from . import documents, symbols
+        except ImportError:
+            raise ValueError("symbolic equations need SymPy: pip install sympy") from None
+        writers = {"latex": documents.latex, "html": documents.page, "sympy": symbols.python_source}
+        return writers[language](symbols.symbolic(model, chosen, limit), lines)
     if arguments.values:
         lines += ["Parameters and their values in the model:"]
         lines += [f"  {x}: {arguments.meanings[x]}: {list(value)}" for x, value in arguments.values.items()]
@@ -114,40 +122,16 @@ def equations(
     return LANGUAGES[language](Program(name, lines, functions, single))
 
 
-def checked_parameters(
-    model: Tree, language: str, quantities: Sequence[str], words: Sequence[str]
-) -> Parameters:
-    parameters = Parameters(model, words)
-    if words and language in SYMBOLIC:
-        raise ValueError(f"in {language} all numbers are symbols; parameters are of other languages")
-    if parameters.has_payload and (bodies := set(quantities).intersection(OF_BODIES)):
-        raise ValueError(f"{min(bodies)} has a row for each body; a payload has none")
-    return parameters
-
-
-def symbolic_text(
-    model: Tree, language: str, quantities: tuple[str, ...], head: Sequence[str], limit: float
-) -> str:
-    try:
-        from . import documents, symbols
-    except ImportError:
-        raise ValueError("symbolic equations need SymPy: pip install sympy") from None
-    writers = {"latex": documents.latex, "html": documents.page, "sympy": symbols.python_source}
-    return writers[language](symbols.symbolic(model, quantities, limit), head)
-
-
 def checked_quantities(quantities: Any, choices: Sequence[str]) -> tuple[str, ...]:
     chosen = tuple(quantities) if isinstance(quantities, list | tuple) else (quantities,)
-    wrong = [x for x in chosen if not is_quantity(x) or (choices and x not in choices)]
-    if wrong or not chosen:
-        what = wrong[0] if wrong else ()
-        expected = f"expected some of {', '.join(choices)}" if choices else what_is_known(what)
-        raise ValueError(f"quantity is {shown(what)}; {expected}")
+    require(chosen, "quantities", chosen, "some quantity is")
     names: dict[str, str] = {}
     for quantity in chosen:
-        if names.setdefault(identifier(quantity), quantity) != quantity:
-            both = f"{shown(names[identifier(quantity)])} and {shown(quantity)}"
-            raise ValueError(f"{both} would both be called {identifier(quantity)}; one of them is expected")
+        is_right = is_quantity(quantity) and (not choices or quantity in choices)
+        expected = f"one of {', '.join(choices)} is" if choices else what_is_known(quantity)
+        require(is_right, "quantity", quantity, expected)
+        is_new = names.setdefault(identifier(quantity), quantity) == quantity
+        require(is_new, f"name of {shown(names[identifier(quantity)])}", identifier(quantity), "another is")
     return chosen
 
 

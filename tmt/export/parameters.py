@@ -20,7 +20,7 @@ MEANINGS = {
 }
 PLACES = (0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)  # of the six numbers of an inertia
 PAYLOAD = "payload"
-OF_BODIES = "com_positions", "angular_velocities", "jacobians", "convective_terms"  # a row for each body
+OF_BODIES = {"com_positions", "angular_velocities", "jacobians", "convective_terms"}  # a row for each body
 
 
 class Frame(NamedTuple):

@@ -18,9 +18,9 @@ from tmt.methods.semi_implicit import SemiImplicitEuler as SemiImplicitEuler
 from tmt.methods.semi_implicit import by_speed as by_speed
 from tmt.methods.semi_implicit import isolated_speeds as isolated_speeds
 from tmt.methods.stepping import Method, Numbers, Slope, State, Tableau, advance, increments
-from tmt.model.values import shown
+from tmt.model.values import require, shown
 
-Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the movement, and accelerations
+Slopes = tuple[list[Values], list[Values]]  # of all stages: rates of the tangent, and accelerations
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class RungeKutta(Tableau):
     """An explicit Runge-Kutta method, by its Butcher tableau; ValueError if that is none, or not explicit.
 
     Applied to (q, qd) as one first-order system, like MuJoCo's RK4; to balls as Munthe-Kaas does, who keeps
-    the order: what is integrated is the movement from the start of the step.
+    the order: what is integrated is the tangent from the start of the step.
     """
 
     # balls turn by the weighted mean of their speeds, as MuJoCo's RK4 up to 3.17: then of order 2
@@ -42,7 +42,7 @@ class RungeKutta(Tableau):
         return self.combined(self.stage_slopes(slope, q, qd, dt, joints), q, qd, dt, joints)
 
     def stage_slopes(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> Slopes:
-        """The rates (of the movement from q, see coordinates.py) and the accelerations of all stages."""
+        """The rates (of the tangent from q, see coordinates.py) and the accelerations of all stages."""
         rates: list[Values] = []
         changes: list[Values] = []
         for row in self.A:
@@ -65,7 +65,7 @@ class AdaptiveRungeKutta(RungeKutta):
     section II.10).
     """
 
-    # weights of the stages in the two estimates, of the movement and of the speeds
+    # weights of the stages in the two estimates, of the tangent and of the speeds
     errors: tuple[Numbers, ...] = ()
 
     adaptive = True
@@ -77,7 +77,7 @@ class AdaptiveRungeKutta(RungeKutta):
             raise ValueError("errors must be two rows of one weight for each stage")
 
     def attempt(self, slope: Slope, q: Values, qd: Values, dt: Scalar, joints: Coordinates) -> Rows:
-        """A step, and the two estimates of its error, each for the movement and qd."""
+        """A step, and the two estimates of its error, each for the tangent and qd."""
         slopes = self.stage_slopes(slope, q, qd, dt, joints)
         estimates = [increments(dt, weights, part, len(qd)) for weights in self.errors for part in slopes]
         return [*self.combined(slopes, q, qd, dt, joints), *estimates]
@@ -115,6 +115,5 @@ def method_named(name: str) -> Method:
         names = ", ".join(METHODS)
         raise ValueError(f"unknown method {shown(name)}; known are {names}, and for simulate taylor")
     stepping = METHODS[name]
-    if not isinstance(stepping, Method):
-        raise ValueError(f"METHODS[{name!r}] is {shown(stepping)}; a tmt.methods.Method is expected")
+    require(isinstance(stepping, Method), f"METHODS[{name!r}]", stepping, "a tmt.methods.Method is")
     return stepping

@@ -36,7 +36,7 @@ PART = 4096  # states times speeds that are taken at once: more do not stay in t
 
 class Change(NamedTuple):
     a: Values
-    by_movement: Rows
+    by_tangent: Rows
     by_speed: Rows
     matrix: Rows
     solve: Callable[[Values], Values]  # the linear system
@@ -65,7 +65,7 @@ class Linearized(Form):
             return change.a
         dq, dqd, right = ([dual.parts(x)[1] for x in part] for part in (q, qd, tau))
         moved = tree.coordinates.tangent(plain_q, dq)
-        right = minus(right, plus(times(change.by_movement, moved), times(change.by_speed, dqd)))
+        right = minus(right, plus(times(change.by_tangent, moved), times(change.by_speed, dqd)))
         if implicit:
             right = minus(right, [dual.parts(x)[1] for x in implicit.force])
         return [Dual(value, slope, dual.level) for value, slope in zip(change.a, change.solve(right))]
@@ -75,20 +75,20 @@ class Linearized(Form):
     ) -> Change:
         a = super().acceleration(tree, q, qd, tau, implicit)
         state = State(tree, {"q": q, "qd": qd, "qdd": a}, self)
-        matrix, (by_movement, by_speed) = state.mass_matrix, state.torque_rates
+        matrix, (by_tangent, by_speed) = state.mass_matrix, state.torque_rates
         if implicit:
             matrix = added(matrix, implicit.matrix)
         if implicit is None or implicit.acts_at_single_joints:
-            return Change(a, by_movement, by_speed, matrix, Factors(matrix).solve)
+            return Change(a, by_tangent, by_speed, matrix, Factors(matrix).solve)
         if implicit.bias_rows:
             changes = self.changes_of_bias(tree, q, qd, a, implicit)
-            matrix, by_movement, by_speed = map(added, (matrix, by_movement, by_speed), changes)
-        return Change(a, by_movement, by_speed, matrix, partial(solve_any, matrix))
+            matrix, by_tangent, by_speed = map(added, (matrix, by_tangent, by_speed), changes)
+        return Change(a, by_tangent, by_speed, matrix, partial(solve_any, matrix))
 
     def changes_of_bias(
         self, tree: Mechanism, q: Values, qd: Values, a: Values, implicit: Implicit
     ) -> list[Rows]:
-        """dt dh/dqd in the implicit rows, and the derivatives of dt dh/dqd a by movements and by speeds."""
+        """dt dh/dqd in the implicit rows, and the derivatives of dt dh/dqd a by tangent vectors and by speeds."""
         rest, half = [0.0] * len(qd), [0.5] * len(qd)
         ahead, behind = (
             State(tree, {"q": q, "qd": speeds, "qdd": rest}, self).force_rates
@@ -114,7 +114,7 @@ def one_step(
 def amplification(
     stepping: Method, tree: Mechanism, q: Array, qd: Array, tau: Array, dt: float | Array
 ) -> Array:
-    """The exact Jacobian of one step, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for movements of q.
+    """The exact Jacobian of one step, d(q, qd)+/d(q, qd), shape (..., 2 nv, 2 nv), for tangent vectors of q.
 
     q (..., nq), qd (..., nv): states, rad and rad/s; tau: torque (nv,), N m; dt: step in s, one for all or
     (...). At an equilibrium its eigenvalues are the growth of each mode per step. By dual numbers, all

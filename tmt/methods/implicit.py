@@ -104,7 +104,7 @@ class ImplicitRungeKutta(Tableau):
 
 
 def placed(joints: Coordinates, q: Values, moved: Values, balls: list[Values]) -> Values:
-    """The position after a movement from q, (nv,), of all but the balls, and these quaternions."""
+    """The position after a tangent from q, (nv,), of all but the balls, and these quaternions."""
     turned, result = iter(balls), []
     for joint in joints.joints:
         result += next(turned) if joint.kind == "ball" else [q[joint.q.start] + moved[joint.qd.start]]

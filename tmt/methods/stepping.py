@@ -12,7 +12,7 @@ from tmt.derivation.coordinates import Coordinates, coordinates_of
 from tmt.derivation.form import LITERAL, Form
 from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.vectors import Scalar, Values, plus, weighted
-from tmt.model.values import listed, real_numbers, shown
+from tmt.model.values import listed, real_numbers, require, shown
 
 Slope = Callable[[Values, Values], Values]
 State = tuple[Values, Values]
@@ -74,9 +74,8 @@ class Tableau(Method):
     c: Numbers  # the time of each stage in units of dt
 
     def __post_init__(self) -> None:
-        if type(self.order) is not int or not 1 <= self.order <= 100:
-            expected = "a whole number from 1 to 100 is expected"
-            raise ValueError(f"order of the method is {shown(self.order)}; {expected}")
+        is_order = type(self.order) is int and 1 <= self.order <= 100
+        require(is_order, "order of the method", self.order, "a whole number from 1 to 100 is")
         self.set_rows("A")
         for name in ("b", "c"):
             self.set_plain(name, numbers(name, getattr(self, name)))

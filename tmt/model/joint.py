@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .values import shown
+from .values import require, shown
 
 THE_ONE_BEFORE = "the joint before"
 AXES = np.eye(3)
@@ -17,7 +17,7 @@ OF_JOINT = "joint_names", "parent", "offset", "kind", "stiffness"
 OF_BODY = "body_names", "body_joint", "mass", "com", "inertia"
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False, match_args=False)
 class Joint:
     """A joint of `Tree.from_joints`, and the body that it moves.
 
@@ -32,8 +32,7 @@ class Joint:
     axis : (3,), of a hinge or slide, in the same axes
     mass : float, kg; None: the joint has no body of its own, as of several joints in one body all but the last
     com : (3,), m, in the frame of the joint
-    inertia : (3,), (6,) or (3, 3), kg m2, about the centre of mass, in the axes of the joint's frame
-        Three: the diagonal; six: xx yy zz xy xz yz.
+    inertia : (3,), the diagonal, (6,), xx yy zz xy xz yz, or (3, 3), kg m2, about the centre of mass, in these axes
     damping, armature : float or one for each speed, N m s/rad and kg m2, of slides N s/m and kg
     stiffness : float, N m/rad, of slides N/m
     rest : float, rad or m, where its spring is without force; of balls and free joints at zero
@@ -63,8 +62,7 @@ def fields_of(joints: Iterable[Joint]) -> dict[str, Any]:
         None: -1
     }  # by its name the number of the joint whose frame is that of its body
     for joint in joints:
-        if not isinstance(joint, Joint):
-            raise ValueError(f"a joint is {shown(joint)}; a tmt.Joint is expected")
+        require(isinstance(joint, Joint), "a joint", joint, "a tmt.Joint is")
         parent = len(rows) - 1 if joint.parent == THE_ONE_BEFORE else last.get(joint.parent)
         if parent is None:
             known = ", ".join(name for name in last if name) or "no joint"
@@ -94,9 +92,7 @@ def tensor(joint: Joint) -> np.ndarray:
     given = np.asarray(joint.inertia, dtype=float)
     if given.shape == (3, 3):
         return given
-    if given.shape not in ((3,), (6,)):
-        raise ValueError(
-            f"inertia of {joint.name!r} has shape {given.shape}; (3,), (6,) or (3, 3) is expected"
-        )
+    of = f"shape of the inertia of {joint.name!r}"
+    require(given.shape in ((3,), (6,)), of, given.shape, "(3,), (6,) or (3, 3) is")
     xx, yy, zz, xy, xz, yz = [*given, 0.0, 0.0, 0.0][:6]
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

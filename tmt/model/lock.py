@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
@@ -11,8 +10,9 @@ import numpy as np
 from tmt.derivation.mechanism import Mechanism, origin_in_parent, rotation_in_parent
 from tmt.derivation.vectors import IDENTITY, ZERO, Matrix, Vector
 
+from .checks import check_quaternion
 from .values import CLOSE_TO_ONE as CLOSE_TO_ONE
-from .values import numbers_of, shown
+from .values import numbers_of, require, shown
 
 Value = TypeVar("Value")
 
@@ -55,9 +55,7 @@ WORLD = Carrier(-1, ZERO, IDENTITY)
 def locked(tree: Mechanism, angles: Mapping[str, Any]) -> dict[str, Any]:
     """The fields that differ in the tree without the joints that are named in `angles`, see Tree.lock."""
     names, joints = tree.joint_names, tree.coordinates.joints
-    if not isinstance(angles, Mapping):
-        expected = "a dict of positions by the names of joints is expected"
-        raise ValueError(f"lock is given {shown(angles)}; {expected}")
+    require(isinstance(angles, Mapping), "angles", angles, "a dict of positions by the names of joints is")
     if unknown := [name for name in angles if name not in names]:
         raise ValueError(f"there is no joint {shown(unknown[0])} to lock; the joints are {', '.join(names)}")
     if len(angles) == len(names):
@@ -132,6 +130,5 @@ def _position(kind: str, value: Any) -> tuple[float, ...]:
     if kind != "ball":
         return numbers_of("lock", [value], (1,))
     (quaternion,) = numbers_of("lock", [value], (1, 4))
-    if abs(math.hypot(*quaternion) - 1.0) > CLOSE_TO_ONE:
-        raise ValueError(f"lock is given {shown(value)}; a quaternion of length 1 is expected")
+    check_quaternion("a locked position", quaternion)
     return quaternion

@@ -20,6 +20,12 @@ CLOSE_TO_ONE = 1e-6  # how far the length of a quaternion may be from 1
 Array = NDArray[np.float64]
 
 
+def require(is_right: object, name: str, value: Any, expected: str) -> None:
+    """Raise ValueError unless it is right: what was given, and what is expected."""
+    if not is_right:
+        raise ValueError(f"{name} is {shown(value)}; {expected} expected")
+
+
 def shown(value: Any) -> str:
     try:
         return textwrap.shorten(reprlib.repr(value), 90, placeholder=" ...")
@@ -55,8 +61,8 @@ def listed(values: Any) -> tuple[Any, ...] | None:
 def names(field: str, values: Any) -> tuple[str, ...]:
     found = listed(values) or ()
     are_names = all(isinstance(name, str) and name.isprintable() for name in found)
-    if listed(values) is None or not are_names or len(set(found)) < len(found):
-        raise ValueError(f"Tree.{field} is {shown(values)}; different names are expected")
+    are_different = listed(values) is not None and are_names and len(set(found)) == len(found)
+    require(are_different, f"Tree.{field}", values, "different names are")
     return tuple(map(str, found))
 
 
@@ -66,8 +72,7 @@ def numbers_of(name: str, values: Any, shape: tuple[int, ...]) -> Any:
         raise ValueError(f"Tree.{name} is {shown(values)}; numbers of shape {shape} are expected")
     if array.shape != shape:
         raise ValueError(f"Tree.{name} has shape {array.shape}; {shape} is expected")
-    if not np.isfinite(array).all():
-        raise ValueError(f"Tree.{name} is {shown(values)}; finite numbers are expected")
+    require(np.isfinite(array).all(), f"Tree.{name}", values, "finite numbers are")
     return nested(array.tolist())
 
 
@@ -112,9 +117,11 @@ def _check_quaternions(model: Mechanism, q: Array) -> None:
             continue
         quaternions = q[..., joint.q].reshape(-1, 4)
         off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
-        if off.size and off.max() > CLOSE_TO_ONE:
-            expected = "a quaternion w, x, y, z of length 1 is expected"
-            raise ValueError(f"q of {name!r} is {quaternions[np.argmax(off)].tolist()}; {expected}")
+        if off.size:
+            worst = quaternions[np.argmax(off)].tolist()
+            require(
+                off.max() <= CLOSE_TO_ONE, f"q of {name!r}", worst, "a quaternion w, x, y, z of length 1 is"
+            )
 
 
 def positive(name: str, value: Any, kind: str) -> float:
@@ -122,18 +129,14 @@ def positive(name: str, value: Any, kind: str) -> float:
         number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
         number = math.inf
-    if not 0.0 < number < math.inf:
-        raise ValueError(f"{name} is {shown(value)}; {kind} above 0 is expected")
+    require(0.0 < number < math.inf, name, value, f"{kind} above 0 is")
     return number
 
 
 def whole(name: str, value: Any) -> int:
     """The value as an int of at least 1 that compiled code can count to."""
     number = int(value) if isinstance(value, numbers.Integral) and not isinstance(value, bool) else 0
-    if number < 1:
-        raise ValueError(f"{name} is {shown(value)}; a whole number of at least 1 is expected")
-    if number >= 2**63:
-        raise ValueError(f"{name} is {shown(value)}; a whole number below 2^63 is expected")
+    require(1 <= number < 2**63, name, value, "a whole number from 1 to 2^63 is")
     return number
 
 
