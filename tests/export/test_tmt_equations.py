@@ -36,21 +36,10 @@ def compile_in(folder, arguments):
     subprocess.run(command, cwd=folder, check=True)
 
 
-def near(values, expected):
-    return all(np.allclose(a, b, rtol=1e-11, atol=1e-12) for a, b in zip(values, expected, strict=True))
-
-
 TREE = tree_of_kinds(np.random.default_rng(3))
 CHAIN = one_body(
     [*UNIT, (0, 1, 0), (1, 0, 0)], ("ball", "slide", "hinge"), (0.3, 0.2, 0.1), stiffness=(2.0, 3.0, 0.0)
 )
-
-
-@pytest.mark.parametrize("name", PLAIN)
-def test_python_gives_the_same_values(name):
-    states = states_of(TREE)[: len(QUANTITIES[name].takes)]
-    found, expected = module(TREE, name)[name](*states), getattr(tmt, name)(TREE, *states)
-    assert near(*((x if isinstance(x, tuple) else (x,)) for x in (found, expected)))
 
 
 @pytest.mark.skipif(not HAS_C, reason="no C compiler")

@@ -105,42 +105,23 @@ def test_ctrl_c_interrupts_a_run(q, dt, steps, more, monkeypatch):
     assert tmt.simulate(model, q, Z, Z, 1e-3, 2, **more | {"every": 1}).evaluations > 0
 
 
-def test_a_few_states_of_a_long_run_take_the_memory_of_a_few(monkeypatch):
-    """Where Mbar may be singular too, with the bits and the reasons of a run of which all states are held."""
-    sizes = []
-    made = np.full
-
-    def full(shape, *more, **named):
-        sizes.append(int(np.prod(shape)))
-        return made(shape, *more, **named)
-
+@pytest.mark.parametrize("method", ["rk4", ADAPTIVE])
+def test_where_mbar_may_be_singular_blocks_of_steps_and_runs_have_the_bits_of_a_whole_run(
+    method, monkeypatch
+):
     tree, q, qd = wrist(), [0.5, 0.8, 1.0], [0.3, 0.0, -0.2]
-    for method in ("rk4", ADAPTIVE):
-        whole = tmt.simulate(tree, q, qd, Z, 1e-4, 6000, method)
-        monkeypatch.setattr(np, "full", full)
-        few = tmt.simulate(tree, q, qd, Z, 1e-4, 6000, method, every=3000)
-        monkeypatch.setattr(np, "full", made)
-        assert not tree.never_singular and max(sizes) <= 1025 * 64 * 3 and len(few.q) == 3
-        assert np.array_equal(few.q, whole.q[::3000]) and np.array_equal(few.qd, whole.qd[::3000])
-        assert few.ended == whole.ended and few.evaluations == whole.evaluations
-        monkeypatch.setattr(simulation, "STEPS", 7)
-        short = tmt.simulate(tree, q, qd, Z, 0.02, 30, method)
-        monkeypatch.setattr(simulation, "STEPS", 1024)
-        whole = tmt.simulate(tree, q, qd, Z, 0.02, 30, method)
-        assert np.array_equal(short.q, whole.q) and short.evaluations == whole.evaluations
-    starts = np.array([[0.5, 0.0, 1.0], *np.tile(q, (70, 1)), [0.5, 0.0, 1.0]])
-    many = tmt.simulate(tree, starts, qd, Z, 1e-3, 2100, "rk4", every=7)
-    one = tmt.simulate(tree, q, qd, Z, 1e-3, 2100, "rk4", every=7)
-    assert (
-        [k for k in range(72) if many.ended[k]] == [0, 71]
-        and "'a', 'c'" in many.ended[0]
-        and one.ended is None
-    )
-    assert np.array_equal(many.q[70], one.q) and np.isnan(many.q[71, 1:]).all()
-    monkeypatch.setattr(simulation, "STEPS", 1)  # the time of an end is that from the start
-    assert tmt.simulate(tree, q, [1.0, 0.0, 0.0], [1e3] * 3, 0.01, 40, "rk4").ended.startswith(
-        "at t = 0.02 s"
-    )
+    whole = tmt.simulate(tree, q, qd, Z, 1e-3, 60, method)
+    monkeypatch.setattr(simulation, "STEPS", 7)
+    monkeypatch.setattr(simulation, "RUNS", 2)
+    few = tmt.simulate(tree, q, qd, Z, 1e-3, 60, method, every=20)
+    assert np.array_equal(few.q, whole.q[::20]) and np.array_equal(few.qd, whole.qd[::20])
+    assert few.ended is whole.ended is None and few.evaluations == whole.evaluations
+    starts = np.array([[0.5, 0.0, 1.0], q, q, [0.5, 0.0, 1.0]])
+    many = tmt.simulate(tree, starts, qd, Z, 1e-3, 60, method)
+    assert [k for k in range(4) if many.ended[k]] == [0, 3] and "'a', 'c'" in many.ended[0]
+    assert np.array_equal(many.q[2], whole.q) and np.isnan(many.q[3, 1:]).all()
+    late = tmt.simulate(tree, q, [1.0, 0.0, 0.0], [1e3] * 3, 0.01, 40, "rk4")
+    assert late.ended.startswith("at t = 0.02 s")  # from the start, not from that of a block
 
 
 def test_a_motion_of_one_unit_takes_the_steps_that_its_error_wants():

@@ -50,13 +50,12 @@ def test_what_is_kept_is_read_the_next_time(folder):
 
 
 def test_each_question_has_a_file_of_its_own(folder):
-    light = dataclasses.replace(tmt.ARM, mass=(1.0, 1.5))
-    turned = dataclasses.replace(tmt.ARM, gravity=(0.0, -0.0, -9.81))
+    light, turned = (
+        dataclasses.replace(tmt.ARM, **x) for x in ({"mass": (1, 1.5)}, {"gravity": (0, -0.0, -9.81)})
+    )
     changed = dataclasses.replace(METHODS["rk4"], order=3)
-    questions = [
-        (), (1,), (4,), ("q",), (tmt.ARM,), (light,), (turned,),
-        *((tmt.ARM, stepping, 1) for stepping in (*METHODS.values(), changed)),
-    ]  # fmt: skip
+    questions = [(), (1,), ("q",), (tmt.ARM,), (light,), (turned,)]
+    questions += [(tmt.ARM, stepping, 1) for stepping in (*METHODS.values(), changed)]
     own = type("Own", (tmt.Tree,), {})(**vars(tmt.ARM))  # which may be another tomorrow
     for question in (*questions, *questions, (own,)):
         assert asked(*question) == 3.0

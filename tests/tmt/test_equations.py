@@ -14,7 +14,6 @@ import tmt
 from tmt.derivation import articulated, composite, method
 
 EPS = np.finfo(float).eps
-STEP = 1e-5  # of central differences, which are right to about 1e-8 of what is differenced
 
 
 @st.composite
@@ -31,57 +30,8 @@ def of_trees(test):
     return settings(max_examples=20)(given(drawn_trees())(test))
 
 
-def along(tree, function, q, u):
-    """The rate of a function of q along the tangent u."""
-    ahead, behind = (np.array(tree.coordinates.move(list(q), list(h * u))) for h in (STEP, -STEP))
-    return (function(ahead) - function(behind)) / (2.0 * STEP)
-
-
-def by_each(tree, function, q):
-    """The derivative of a function of q by each tangent, in the last axis."""
-    return np.stack([along(tree, function, q, u) for u in np.eye(len(tree.axis))], axis=-1)
-
-
 def assert_close(found, expected, scale=1.0, digits=1e-7):
     assert np.abs(found - expected).max() <= digits * (scale + np.abs(expected).max())
-
-
-@of_trees
-def test_the_mass_matrix_gives_the_kinetic_energy_and_the_acceleration_which_changes_it(drawn):
-    """By the power of the torque less what dampers take."""
-    tree, q, qd, tau, _ = drawn
-    M, qdd = tmt.mass_matrix(tree, q), tmt.acceleration(tree, q, qd, tau)
-    assert np.array_equal(M, M.T) and np.linalg.eigvalsh(M)[0] > 0.0
-    inverse = tmt.inverse_mass_matrix(tree, q)
-    assert np.array_equal(inverse, inverse.T) and np.array_equal(
-        tmt.derivatives(tree, q, qd, tau)[2], inverse
-    )
-    kinetic = tmt.energy(tree, q, qd) - tmt.potential_energy(tree, q)
-    assert_close(kinetic, qd @ M @ qd / 2, abs(tmt.potential_energy(tree, q)), 64 * EPS)
-    right = tau - tree.damping * qd - tmt.spring_torque(tree, q) - tmt.bias(tree, q, qd)
-    assert_close(M @ qdd, right, np.abs(M).max() * np.abs(qdd).max(), 256 * EPS)
-    there = [np.array(tree.coordinates.move(list(q), list(h * qd))) for h in (STEP, -STEP)]
-    ends = [tmt.energy(tree, q, qd + h * qdd) for q, h in zip(there, (STEP, -STEP))]
-    power = tau @ qd - tree.damping @ qd**2
-    assert_close((ends[0] - ends[1]) / (2.0 * STEP), power, np.abs(ends).max() + np.abs(qdd).max() ** 2)
-
-
-@of_trees
-def test_jacobians_and_convective_terms_are_derivatives_of_what_moves(drawn):
-    tree, q, qd, *_ = drawn
-
-    def turns(q):
-        frames = method.joint_frames(tree, list(q))
-        return np.array([[list(row) for row in frames[joint].rotation] for joint in tree.body_joint])
-
-    T, B = tmt.jacobians(tree, q)
-    assert_close(T, by_each(tree, lambda q: tmt.com_positions(tree, q), q))
-    spin = np.einsum("bji,bjkn->bikn", turns(q), by_each(tree, turns, q))  # R' dR = [omega]x in body axes
-    assert_close(B, np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=1))
-    assert_close(tmt.angular_velocities(tree, q, qd), B @ qd, 10.0, 64 * EPS)
-    rates = [along(tree, lambda q, part=part: tmt.jacobians(tree, q)[part] @ qd, q, qd) for part in (0, 1)]
-    for found, expected in zip(tmt.convective_terms(tree, q, qd), rates):
-        assert_close(found, expected, np.abs(qd).sum() ** 2)
 
 
 @of_trees

@@ -9,10 +9,8 @@ import mpmath
 import numpy as np
 import pytest
 from helpers.trees import one_body, random_state, small_tree, tree_of_kinds, wrist
-from models import PATHS
 
 import tmt
-from compare.engines.mujoco import read
 from tmt.derivation import composite
 from tmt.derivation.method import acceleration
 from tmt.exact import motion as reference_run
@@ -68,38 +66,6 @@ def test_a_pendulum_is_its_elliptic_function(axis, arm, form):
     assert max(off(path, [angle], k) for k, angle in enumerate(expected)) < 1e-28
 
 
-def product(p, q):
-    """p o q of quaternions, w first."""
-    (a, *u), (b, *v) = p, q
-    u, v = np.array(u), np.array(v)
-    return [a * b - u @ v, *(a * v + b * u + np.cross(u, v))]
-
-
-def turned_about(omega, t):
-    """The quaternion of a rotation with a constant angular velocity."""
-    speed = mpmath.norm(omega)
-    return [mpmath.cos(speed * t / 2), *(mpmath.sin(speed * t / 2) / speed * w for w in omega)]
-
-
-def test_a_symmetric_free_body_precesses_about_its_angular_momentum():
-    turn, spin, inertia = (0.5, 0.5, -0.5, 0.5), (4.0, 1.0, 3.0), np.diag([2.0, 2.0, 0.5])
-    tree = read(PATHS["free_body"]).tree
-    tree = dataclasses.replace(tree, inertia=[inertia], com=[(0.0, 0.0, 0.0)], damping=[0.0] * 6)
-    path = trajectory(tree, [0.0] * 3 + list(turn), [1.0, 0.0, 2.0, *spin], [0.0] * 6, 0.25, 4)
-    assert np.array_equal(tree.axis[3:], np.eye(3))
-    for k in (1, 4):
-        with mpmath.workdps(60):
-            t, g = mpmath.mpf(0.25 * k), [mpmath.mpf(v) for v in tree.gravity]
-            position = [v * t + a * t**2 / 2 for v, a in zip((1, 0, 2), g)]
-            speed = [v + a * t for v, a in zip((1, 0, 2), g)]
-            rate = (mpmath.mpf(0.5) - 2) / 2 * 3  # of the spin about the axis of symmetry, in the body's axes
-            (x, y, z), cosine, sine = spin, mpmath.cos(rate * t), mpmath.sin(rate * t)
-            omega = [x * cosine - y * sine, x * sine + y * cosine, z]
-            momentum = [4, 1, mpmath.mpf(0.75)]  # over the moment about the other axes
-            quaternion = product(product(turn, turned_about(momentum, t)), turned_about([0, 0, -rate], t))
-        assert off(path, [*position, *quaternion, *speed, *omega], k) < 1e-29
-
-
 @pytest.mark.parametrize("tree", [small_tree(), tree_of_kinds(np.random.default_rng(1), bodies=1)])
 def test_trees_of_every_kind_beside_a_short_run_in_many_digits(tree, rng):
     """Balls, slides and free joints, springs, armature, damping, axes to the last digit, a controller."""
@@ -153,15 +119,13 @@ def test_a_run_says_why_it_ended(method, start, more, says):
     assert 0 <= last < 200 and np.isnan(motion.q[last + 1 :]).all() and np.isnan(motion.qd[last + 1 :]).all()
     some = tmt.simulate(model, *start, **arguments, every=40)
     assert some.ended == motion.ended and np.array_equal(some.q, motion.q[::40], equal_nan=True)
-    rows = [np.array([value] * 9, dtype=float) for value in ([0.5, 1.0, 1.0], REST, REST)]
-    for row, value in zip(rows, start):
-        row[4] = value
-    short = arguments | {"steps": min(200, last + 2)}
     if method == "rk4":
+        rows = np.tile(np.array([[0.5, 1.0, 1.0], REST, REST])[:, None], (1, 9, 1))
+        rows[:, 4] = start
+        short = arguments | {"steps": min(200, last + 2)}
         among = tmt.simulate(model, *rows, **short)
-        assert among.ended[4] == motion.ended
+        assert among.ended[4] == motion.ended and (among.ended[0] is None or "dt" in more or "model" in more)
         assert np.array_equal(among.q[4], motion.q[: short["steps"] + 1], equal_nan=True)
-        assert [k for k in range(9) if k != 4 and among.ended[k]] == [] or "dt" in more or "model" in more
 
 
 def test_a_hinge_whose_motion_does_not_depend_on_its_angle_ends_at_the_limit():
@@ -191,29 +155,23 @@ def test_the_last_state_of_a_run_is_looked_at():
 
 
 def test_a_motion_is_three_arrays_and_more():
-    motion = tmt.simulate(tmt.ARM, BENT, REST, REST, 0.1, 5)
-    t, q, qd = motion
-    assert len(motion) == 3 and motion[0] is motion.t is t and q is motion.q and qd is motion.qd
-    assert isinstance(motion, tuple) and motion.ended is None and motion.evaluations == 20
     batch = tmt.simulate(tmt.ARM, [[BENT, BENT]], [[REST, [1e200] * 3]], REST, 0.1, 5)
+    t, q, qd = batch
+    assert isinstance(batch, tuple) and t is batch.t is batch[0] and q is batch.q and qd is batch.qd
     assert batch.evaluations == 4 * (5 + 1) and batch.ended.shape == (1, 2)
     assert batch.ended[0, 0] is None and "2^49" in batch.ended[0, 1]
     for again in (copy.deepcopy(batch), pickle.loads(pickle.dumps(batch))):
         assert type(again) is tmt.Motion and again.evaluations == batch.evaluations
-        assert np.array_equal(again.ended, batch.ended)
-        assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(again, batch, strict=True))
+        assert np.array_equal(again.ended, batch.ended) and np.array_equal(again.q, q, equal_nan=True)
 
 
 def test_taylor_is_the_true_motion_of_each_run(rng):
     starts, tau = rng.uniform(-1, 1, (2, 3)), rng.uniform(-1, 1, (2, 3))
-    motion = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1, 6, "taylor")
-    assert motion.ended.tolist() == [None, None] and motion.evaluations >= 2
-    near = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1 / 256, 6 * 256, "dopri8", every=256)
+    motion = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1, 6, "taylor", every=2)
+    assert motion.ended.tolist() == [None, None] and np.array_equal(motion.q[:, 0], starts)
+    near = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1 / 256, 6 * 256, "dopri8", every=512)
     assert np.abs(near.q - motion.q).max() < 1e-13 and np.array_equal(near.t, motion.t)
-    assert np.array_equal(motion.q[:, 0], starts)
-    second = tmt.simulate(tmt.ARM, starts[1], REST, tau[1], 0.1, 6, "taylor", every=2)
-    assert np.array_equal(second.q, motion.q[1, ::2]) and second.ended is None
-    loose = tmt.simulate(tmt.ARM, starts, REST, tau, 0.5, 3, "taylor", tolerance=1e-6)
-    assert loose.evaluations < tmt.simulate(tmt.ARM, starts, REST, tau, 0.5, 3, "taylor").evaluations
+    loose = tmt.simulate(tmt.ARM, starts, REST, tau, 0.1, 6, "taylor", tolerance=1e-6)
+    assert 2 <= loose.evaluations < motion.evaluations
     stiff = dataclasses.replace(tmt.ARM, damping=(1e6, 0.0, 0.0))
     assert "series" in tmt.simulate(stiff, BENT, REST, REST, 0.1, 5, "taylor").ended

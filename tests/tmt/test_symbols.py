@@ -11,9 +11,7 @@ import pytest
 import sympy
 from helpers.trees import random_tree, small_tree, tree_of_kinds
 
-import compare
 import tmt
-from compare.engines.mujoco import read
 from compare.judge.entries import Entries
 from compare.run.reference import compared_with
 from tmt import Tree
@@ -23,10 +21,6 @@ from tmt.export.symbols import python_source, symbolic
 
 EPS = np.finfo(float).eps
 SCALES = {"mass_matrix": "mass_matrix", "bias": "bias", "gravity_balance": "weight"}
-DOUBLE = """<mujoco><worldbody><body name="upper"><joint name="hip" axis="0 1 0"/>
-  <inertial pos="0 0 -0.25" mass="1.2" diaginertia="0.02 0.021 0.003"/>
-  <body name="lower" pos="0 0 -0.5"><joint name="knee" axis="0 1 0"/>
-  <inertial pos="0 0 -0.21" mass="0.8" diaginertia="0.01 0.011 0.002"/></body></body></worldbody></mujoco>"""
 
 
 def tree_of(name) -> Tree:
@@ -104,14 +98,6 @@ def test_what_cannot_be_derived_is_one_line():
         with pytest.raises(ValueError, match=words) as error:
             symbolic(tree, limit=0.2)
         assert "\n" not in str(error.value)
-
-
-def test_python_text_is_accepted_by_the_comparison():
-    tree = read(DOUBLE).tree
-    own = {}
-    exec(python_source(symbolic(tree), ["a head"]), own)
-    compare.assert_agrees(DOUBLE, **{name: own[name] for name in ("mass_matrix", "bias", "gravity")})
-    assert own["joint_names"] == ["hip", "knee"] and own["parameters"][sympy.Symbol("m_lower")] == 0.8
 
 
 @pytest.mark.skipif(shutil.which("pdflatex") is None, reason="no pdflatex")

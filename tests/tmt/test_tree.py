@@ -49,13 +49,6 @@ def test_what_cannot_be_is_refused_in_one_line(tree, changes, word):
     assert "\n" not in str(error.value)
 
 
-def test_a_state_of_a_ball_is_refused_by_its_name():
-    with pytest.raises(ValueError, match=r"'a'.*quaternion"):
-        tmt.mass_matrix(SLIDE_ON_A_BALL, [1.1, 0.0, 0.0, 0.0, 0.0])
-    with pytest.raises(ValueError, match=r"5.*slide.*ball"):
-        tmt.mass_matrix(SLIDE_ON_A_BALL, np.zeros(4))
-
-
 def chain(axes, com=(0.3, 0.1, 0.2), inertia=POINT, **more):
     """One body, a point by default, that hangs on hinges in a row."""
     return one_body(axes, (), com, inertia, mass=[2.0], **more)

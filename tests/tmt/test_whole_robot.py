@@ -4,15 +4,12 @@ import mujoco
 import numpy as np
 import pytest
 from helpers.crane import crane
-from helpers.many_digits import distance, exact
 from helpers.trees import random_states, small_tree, tree_of_kinds
 from models import PATHS
 
 import compare
 import tmt
 from compare.engines.mujoco import parse
-from compare.judge.scale import EPS
-from tmt.derivation.quantities import QUANTITIES
 
 TREES = {"arm": tmt.ARM, "balls": tree_of_kinds(np.random.default_rng(3)), "gains": small_tree()}
 
@@ -80,18 +77,6 @@ def test_regressor_times_the_numbers_of_the_bodies_is_the_torque(tree, rng):
     assert np.abs(Y @ tree.inertial_parameters - torque).max() < 1e-12 * max(1.0, np.abs(torque).max())
 
 
-@pytest.mark.parametrize(
-    "name", ["com", "com_jacobian", "centroidal_momentum_matrix", "coriolis_matrix", "regressor"]
-)
-def test_each_has_the_digits_of_50(name, rng):
-    tree = TREES["balls"]
-    states = random_states(rng, tree, 1)
-    takes = len(QUANTITIES[name].takes)
-    found = getattr(tmt, name)(tree, *(x[0] for x in states[:takes]))
-    truth = exact(tree, *(x[0] for x in states), qdd=states[2][0])
-    assert distance(found, getattr(truth, name)).max() <= 256 * EPS * max(1.0, np.abs(found).max())
-
-
 JOINTS = [
     tmt.Joint("base", "free", offset=(0.2, 0.1, 0.5), mass=2.0, inertia=(0.1, 0.2, 0.15)),
     tmt.Joint("hip", offset=(0.1, 0.0, -0.2), axis=(0.0, 1.0, 0.0), damping=0.3),
@@ -133,11 +118,3 @@ def test_what_is_no_joint_is_said_in_a_line(word):
     with pytest.raises(ValueError, match=word) as error:
         tmt.Tree.from_joints(WRONG[word])
     assert "\n" not in str(error.value)
-
-
-def test_the_energy_of_a_run_that_ended_early_is_nan_from_there_on():
-    motion = tmt.simulate(tmt.ARM, [0.5, 0.3, 1.0], [1e200, 0.0, 0.0], np.zeros(3), 0.1, 4)
-    energy = tmt.energy(tmt.ARM, motion.q, motion.qd)
-    assert motion.ended and (np.isnan(energy) == np.isnan(motion.q[:, 0])).all() and not np.isnan(energy[0])
-    with pytest.raises(ValueError, match="finite"):
-        tmt.energy(tmt.ARM, [0.0, np.nan, 0.0], np.zeros(3))
