@@ -12,7 +12,6 @@ import pytest
 from helpers.in_process import answered
 from models import PATHS
 
-import compare
 import tmt
 from compare.__main__ import main
 from compare.experiments.quantities import QUANTITIES as COMPARED
@@ -23,7 +22,6 @@ from compare.export.programs import PROGRAMS, NotRun, Program, PythonProgram, Wr
 from compare.robots.arm import ARM
 from compare.run.reference import compared_with
 from tmt.derivation.quantities import QUANTITIES
-from tmt.export.parameters import Parameters
 
 HAS_C, HAS_OCTAVE = (bool(shutil.which(name)) for name in ("gcc", "octave-cli"))
 NEEDS = {"c": HAS_C, "matlab": HAS_OCTAVE, "python": True, "latex": True}
@@ -50,15 +48,6 @@ def test_the_arm_in_a_language(language, options, tmp_path, capsys):
         assert ("float out[3]" in text) == ("--float" in options)
     parts = QUANTITIES["derivatives"].parts if "derivatives" in "".join(options) else ()
     assert all(name in shown for name in ("mass_matrix", "bias", str(out), *parts))
-
-
-def test_what_is_exported_to_python_can_be_checked_as_a_users_equations(tmp_path):
-    out = tmp_path / "mixed"
-    assert main(["equations", "--mjcf", str(PATHS["mixed"]), "--to", "python", "--out", str(out)]) == 0
-    found = {}
-    exec((out / "mixed.py").read_text(encoding="utf-8"), found)
-    functions = {name: found[name] for name in ("mass_matrix", "bias", "acceleration")}
-    compare.assert_agrees(str(PATHS["mixed"]), **functions)
 
 
 def outcome_of(make, *quantities, compared=None, single=False):
@@ -198,36 +187,6 @@ def test_parameters_are_compared_with_the_file_that_has_other_values(language, t
     assert "payload_inertia" in text and "centre of mass of payload in the frame of rod" in text
 
 
-@pytest.mark.parametrize("share, passes", [(0.5, True), (2.0, False)])
-@pytest.mark.parametrize("words, index", [(["gravity"], 2), (["arm.mass"], 0), (["payload", "arm"], 0)])
-def test_a_parameter_that_goes_in_a_little_wrong_is_found(words, index, share, passes, tmp_path):
-    """With other values alone: those of the model are what they were. By half and twice the tolerance of a hinge's bias."""
-    (tmp_path / "hinge.xml").write_text(HINGE)
-    compared = with_sites(compared_with("model", str(tmp_path / "hinge.xml")))
-    tree = compared.robot.tree
-    text = tmt.equations(tree, "python", ["bias"], name="x", parameters=words)
-    (tmp_path / "x.py").write_text(text)
-    chosen = Parameters(tree, words)
-    stated, other = (next(iter(x.values()))[index] for x in (chosen.values, checks.other_values(chosen)))
-
-    class Wrong(PythonProgram):
-        def values(self, quantity, states):
-            values = super().values(quantity, states)
-            is_other = next(iter(self.parameters.values()))[index] != stated
-            scale = checks.Entries(changed(tree, chosen, self.parameters), *states[:2]).bias
-            return values + share * 64 * 2.0**-52 * scale * is_other
-
-    outcome, _ = checks.checked(
-        compared, partial(Wrong, tmp_path, "x", tree, ["bias"], False, chosen), ["bias"], COUNT, False, chosen
-    )
-    assert other != stated and [row.quantity for row in outcome.rows] == ["bias", "bias (p)"]
-    assert [row.passed for row in outcome.rows] == [True, passes]
-
-
-def changed(tree, chosen, parameters):
-    return tmt.Tree(**vars(chosen.applied(tree, {name: list(value) for name, value in parameters.items()})))
-
-
 @pytest.mark.parametrize("quantity, name", [
     *product(("inverse_mass_matrix", "inverse_dynamics", "inverse_dynamics_derivatives", "derivatives", "frame_pose:",
               "frame_jacobian:", "frame_convective:"), ("pendulum_ball", "arm")),
@@ -254,8 +213,6 @@ def test_what_mujoco_has_not_is_judged_by_exact_values_and_the_scale_of_each_ent
         assert all(row.of_exact < 1.0 for row in outcome.rows) is passes
 
 
-HINGE = """<mujoco><worldbody><body name="arm"><joint name="a" axis="0 1 0"/><inertial pos="0 0 -0.3" mass="1.2"
-diaginertia="0.01 0.02 0.01"/></body></worldbody></mujoco>"""
 SWING = """<mujoco><worldbody><body name="frame" pos="0 0 1" euler="20 0 10"><joint name="a" axis="0 1 0"/>
 <geom type="capsule" size="0.05" fromto="0 0 0 0.3 0 0"/><body name="rod" pos="0.3 0 0" euler="0 30 40">
 <joint name="b" axis="1 0 0"/><geom type="capsule" size="0.04" fromto="0 0 0 0 0.1 -0.3"/></body></body></worldbody></mujoco>"""

@@ -54,23 +54,26 @@ def kinds(seed=3):
     return tree_of_kinds(np.random.default_rng(seed), bodies=3)
 
 
+def assert_exact(tree, quantity, scales, literal, *state):
+    """The literal form's numbers and those of machine code, entry by entry."""
+    truth = exact_of_many(tree, quantity, *state)
+    for found in (literal, Evaluator(tree, quantity).of_any(*state)):
+        for k, (values, scale) in enumerate(zip(found, scales, strict=True)):
+            assert (truth.part(k).distance(values) <= FACTOR * EPS * scale).all()
+
+
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in MANY]
 
 
 @pytest.mark.parametrize("name", ["arm", *FEW, *SLOW])
-def test_derivatives_are_those_of_31_digits_entry_by_entry(name, rng):
-    """And machine code's, in closed form or by dual numbers."""
+def test_derivatives_are_those_of_31_digits(name, rng):
     tree = model(name)
-    q, qd, tau = random_states(rng, tree, 3)
-    qdd, by = tmt.acceleration(tree, q, qd, tau), tmt.derivatives(tree, q, qd, tau)
-    entries = Entries(tree, q, qd)
-    scales = entries.derivatives(tau, qdd, by), entries.force_rates(tau)
-    for quantity, scale in zip(("derivatives", "inverse_dynamics_derivatives"), scales):
-        truth = exact_of_many(tree, quantity, q, qd, tau)
-        compiled = Evaluator(tree, quantity).of_any(q, qd, tau)
-        for found in (getattr(tmt, quantity)(tree, q, qd, tau), compiled):
-            for k, (values, allowed) in enumerate(zip(found, scale, strict=True)):
-                assert (truth.part(k).distance(values) <= FACTOR * EPS * allowed).all()
+    q, qd, tau = state = random_states(rng, tree, 3)
+    by, entries = tmt.derivatives(tree, *state), Entries(tree, q, qd)
+    scales = entries.derivatives(tau, tmt.acceleration(tree, *state), by)
+    assert_exact(tree, "derivatives", scales, by, *state)
+    inverse = tmt.inverse_dynamics_derivatives(tree, *state)
+    assert_exact(tree, "inverse_dynamics_derivatives", entries.force_rates(tau), inverse, *state)
 
 
 def beside():
@@ -124,16 +127,15 @@ def test_a_and_b_are_the_limits_of_differences_of_a_step(method, make, rng):
 
 
 @pytest.mark.parametrize(
-    "method, tree", [*((method, tmt.ARM) for method in STRAIGHT), ("implicitfast", beside())]
+    "method, tree", [*((name, tmt.ARM) for name in STRAIGHT), ("implicitfast", beside())]
 )
 def test_a_compiled_step_has_the_derivatives_of_31_digits(method, tree, rng):
     q, qd, tau = random_states(rng, tree, 2)
-    by, dt = tmt.derivatives(tree, q, qd, tau), np.full((2, 1), 0.02)
-    entries = Entries(tree, q, qd)
+    by, entries = tmt.derivatives(tree, q, qd, tau), Entries(tree, q, qd)
     scale = entries.step(0.02, by, entries.derivatives(tau, tmt.acceleration(tree, q, qd, tau), by))
-    name = f"step_derivatives:{method}"
-    truth = exact_of_many(tree, name, q, qd, tau, dt)
     both = np.concatenate(tmt.step_derivatives(tree, q, qd, tau, 0.02, method), axis=2)
+    dt, name = np.full((2, 1), 0.02), f"step_derivatives:{method}"
+    truth = exact_of_many(tree, name, q, qd, tau, dt)
     for found in (both, Evaluator(tree, name).of_any(q, qd, tau, dt)):
         assert (truth.distance(found) <= FACTOR * EPS * scale).all()
 

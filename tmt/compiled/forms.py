@@ -43,14 +43,15 @@ def solved_by_call(matrix: Rows, right: Values) -> Values:
     return tape.call("solution", [*(x for row in matrix for x in row), *right], len(right))
 
 
-@lru_cache(maxsize=64)
 def forms_of_slopes(tree: Tree) -> list[Form]:
-    """Of a large tree that with the shortest accelerations alone."""
-    forms = forms_of(tree)
-    if tree.nv <= DENSE:
-        return forms
+    return forms_of(tree) if tree.nv <= DENSE else [shortest_form(tree)]
+
+
+@lru_cache(maxsize=64)
+def shortest_form(tree: Tree) -> Form:
+    """Of a large tree that with the shortest accelerations."""
     sizes = tree.nq, tree.nv, tree.nv
-    return [min(forms, key=lambda form: trace("slope", sizes, partial(form.acceleration, tree)).length)]
+    return min(forms_of(tree), key=lambda form: trace("", sizes, partial(form.acceleration, tree)).length)
 
 
 def quantity(tree: Tree, name: str, more: Sequence[int] = (), tree_of: TreeOf | None = None) -> Traced:
