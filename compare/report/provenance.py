@@ -15,16 +15,16 @@ from ..core.words import readable
 from ..process.workers import Clock
 
 OURS = "arm-tmt-mujoco"
+# those that are installed
 PACKAGES = ["mujoco", "numpy", "scipy", "pandas", "matplotlib", "llvmlite", "mpmath", "rich", "heyoka"]
-# if installed
-OF_ENGINES = ["drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton"]
+PACKAGES += ["drake", "pin", "mujoco-mjx", "jax", "mujoco-warp", "newton"]  # of engines
 # changes elsewhere do not change the program
 PROGRAM_FILES = [":/compare", ":/mjcf", ":/tmt", ":/pyproject.toml"]
 
 
 def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[str, Any]:
     """Command, model (a file, shown by this name), versions, machine, commit and seed; `seconds` follow."""
-    versions = {package: installed(package) for package in (*PACKAGES, *OF_ENGINES)}
+    versions = {package: number for package in (OURS, *PACKAGES) if (number := installed(package))}
     return {
         "command": readable(command),
         "model": readable(shown),
@@ -37,9 +37,7 @@ def provenance(command: str, model: str | Path, shown: str, seed: int) -> dict[s
         "cores": os.cpu_count(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
-        OURS: installed(OURS),
-        **{package: number for package, number in versions.items() if number or package in PACKAGES},
-    }
+    } | versions
 
 
 def durations(clock: Clock) -> dict[str, dict[str, float]]:

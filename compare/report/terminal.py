@@ -4,7 +4,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from textwrap import TextWrapper
 from typing import IO, cast
 
@@ -18,7 +18,6 @@ from ..process.streams import Stream
 
 WIDEST = 100  # columns of a line on a terminal, which may be wider
 LONG = 5.0  # s, after which it is said for how long something has been going on
-EMPTY_LINE, SHOW_CURSOR = "\r\x1b[2K", "\x1b[?25h"  # empty the line, show the cursor that was hidden
 
 
 class Terminal:
@@ -42,11 +41,9 @@ class Terminal:
             text = narrow if len(narrow) <= columns else wrapped.fill(text)
         if self.status:
             self.status.stop()
-        try:
-            self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
-        finally:
-            if self.status:
-                self.status.start()
+        self.lines.print(Text(text, style=style), soft_wrap=True, highlight=False)
+        if self.status:
+            self.status.start()
 
     def say_lines(self, lines: Iterable[str], style: str = "") -> None:
         """Print lines, the first one in this style."""
@@ -61,20 +58,13 @@ class Terminal:
     def progress(self, text: str) -> Iterator[None]:
         """Show the progress during this block, on a terminal that can overwrite a line."""
         self.show(text)
-        if not self.screen.is_terminal or self.screen.is_dumb_terminal:
-            yield
-            return
-        spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
-        self.status = self.screen.status(self, spinner=spinner)
+        if self.screen.is_terminal and not self.screen.is_dumb_terminal:
+            spinner = "dots" if self.err.encoding.lower().startswith("utf") else "line"
+            self.status = self.screen.status(self, spinner=spinner)
         try:
-            self.status.start()
-            yield
+            with self.status or nullcontext():
+                yield
         finally:
-            self.stop()
-
-    def stop(self) -> None:
-        if self.status:
-            self.status.stop()
             self.status = None
 
     def line(self) -> str:
