@@ -30,13 +30,13 @@ from .setup import Setup
 
 
 class Comparison:
-    """Two engines, at random states also tmt's compiled functions: each function is called once."""
+    """Two engines, at random states also tmt's compiled functions, but in quick runs: each function is called once."""
 
     def __init__(self, setup: Setup, result: Result, sample: Sample):
         self.sample, self.robot = sample, setup.robot
         self.engines: list[Any] = [*setup.compared().values()]  # Dynamics that know more, MuJoCo second
         is_small = self.robot.coordinates.nv <= MOST_SPEEDS  # code for more takes minutes to compile
-        if sample is setup.random and is_small and not self.robot.own:
+        if sample is setup.random and is_small and not (setup.is_quick or self.robot.own):
             self.engines.append(Compiled(self.robot.tree))
         self.scale = Entries(self.robot.tree, sample.q, sample.qd)
         self.returned: dict[str, list[Any]] = {}

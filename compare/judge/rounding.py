@@ -6,6 +6,7 @@ from numpy import ndarray
 from tmt import Tree, acceleration
 from tmt.literal import gather
 from tmt.methods import METHODS, Linearized, amplification
+from tmt.methods.derivatives import PART
 from tmt.methods.stepping import Method
 
 from .entries import Entries
@@ -105,28 +106,27 @@ def band(
     blocks = (steps if most is None else min(steps, most)) // every
     if blocks <= 0:
         return widths
-    q, qd = q[: blocks * every], qd[: blocks * every]
-    jacobians = amplification(stepping, tree, q, qd, tau, dt).reshape(blocks, every, size, size)
     # the bound varies slowly: at fine steps it is computed at some states, and used for those that follow
     stride = max(1, every // SAMPLED)
-    delta = step_rounding(stepping, tree, q[::stride], qd[::stride], tau, dt)
-    delta = np.repeat(delta, stride, axis=0)
-
-    # to_end[j, k]: from after step k of block j to the end of the block; all blocks at once
-    to_end = np.empty_like(jacobians)
-    to_end[:, -1] = np.eye(size)
-    for k in reversed(range(every - 1)):
-        to_end[:, k] = to_end[:, k + 1] @ jacobians[:, k + 1]
-    across = to_end[:, 0] @ jacobians[:, 0]
-
-    carried = np.empty((size, blocks * every, size))  # carried[:, k]: the rounding of step k, propagated
-    for j in range(blocks):
-        start, end = j * every, (j + 1) * every
-        carried[:, :start] = np.tensordot(across[j], carried[:, :start], axes=1)
-        carried[:, start:end] = to_end[j].transpose(1, 0, 2)
-        widths[j + 1] = np.abs(carried[:, :end]).reshape(size, -1) @ delta[:end].ravel()
-        if not widths[j + 1].max() < 1e6 * NARROW:
-            break
+    carried, deltas = np.empty((size, 0, size)), np.empty(0)  # carried[:, k]: the rounding of step k, propagated
+    together = max(1, PART // (every * qd.shape[1]))  # blocks whose Jacobians are computed at once
+    for first in range(0, blocks, together):
+        part = slice(first * every, min(first + together, blocks) * every)
+        jacobians = amplification(stepping, tree, q[part], qd[part], tau, dt).reshape(-1, every, size, size)
+        sampled = slice(part.start, part.stop, stride)
+        delta = step_rounding(stepping, tree, q[sampled], qd[sampled], tau, dt)
+        deltas = np.concatenate([deltas, np.repeat(delta, stride, axis=0).ravel()])
+        to_end = np.empty_like(jacobians)  # [j, k]: from after step k of block j to the end of the block
+        to_end[:, -1] = np.eye(size)
+        for k in reversed(range(every - 1)):
+            to_end[:, k] = to_end[:, k + 1] @ jacobians[:, k + 1]
+        across = to_end[:, 0] @ jacobians[:, 0]
+        for j, of_block in enumerate(to_end, first + 1):
+            earlier = np.tensordot(across[j - first - 1], carried, axes=1)
+            carried = np.concatenate([earlier, of_block.transpose(1, 0, 2)], axis=1)
+            widths[j] = np.abs(carried).reshape(size, -1) @ deltas[: carried.shape[1] * size]
+            if not widths[j].max() < 1e6 * NARROW:
+                return widths
     return widths
 
 

@@ -18,10 +18,10 @@ from ...robots.case import Case
 from ...robots.stick import as_seen, stick_figure
 from .pairs import SCHEMES_OF_RK4, Pair
 
-FRAMES = 128  # of a scene at most, without its start
+FRAMES = 64  # of a scene at most, without its start
 SCENES = 2
 SIZE, DPI = (6.4, 4.2), 100  # inches, and pixels of an inch
-MILLISECONDS, PAUSE = 40, 1200  # of a picture, and of the last one of a scene
+MILLISECONDS, PAUSE = 80, 1200  # of a picture, and of the last one of a scene
 # of the first engine, and of MuJoCo, which is drawn over it
 LOOKS = {"linewidth": 12, "marker": "o", "markersize": 14, "color": BLUE, "solid_capstyle": "round"}, {
     "linewidth": 4, "marker": "o", "markersize": 9, "markerfacecolor": "white", "color": ORANGE,
