@@ -32,7 +32,7 @@ def test_own_equations_that_change_the_folder_have_their_report_where_it_was_ask
 ):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "double.xml").write_text(own_equations.XML)
-    lines = "import os", "from own_equations import bias, mass_matrix", "os.chdir('elsewhere')"
+    lines = "import os", "from helpers.own_equations import bias, mass_matrix", "os.chdir('elsewhere')"
     (tmp_path / "moves.py").write_text("\n".join(lines))
     monkeypatch.chdir(tmp_path)
     assert main(["mass", "--quick", "--mjcf", "double.xml", "--reference", "moves.py:", "--out", "out"]) == 0

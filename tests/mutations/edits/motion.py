@@ -5,7 +5,7 @@ EDITS = (
     ("rounding", "slope_rounding", "FACTOR * EPS * _1", "30 * _0", "band x 30: the rounding of the slope"),
     ("rounding", "step_rounding", "8 * EPS * (np.abs(qd) + _1)", "30 * _0", "rounding of the rates x 30"),
     ("rounding", "step_rounding", "8 * EPS * (of_positions(*_1) + _2)", "30 * _0", "rounding of the angles x 30"),
-    ("rounding", "band", "np.abs(carried[:, :end])", "30 * np.abs(carried[:, :end])", "the carried rounding x 30"),
+    ("rounding", "band", "np.abs(carried)", "30 * np.abs(carried)", "the carried rounding x 30"),
     ("rounding", "growth", "np.log10(size)", "2 * np.log10(size)", "growth of a small difference squared"),
     ("rounding", "growth", "finite_states(q, qd)", "len(q)", "the growth of a run that has diverged goes on"),
     ("rounding", "slope_rounding", "gain_scale(tree, q, qd)", "30 * _0", "band x 30 where servos act"),
