@@ -108,7 +108,8 @@ def band(
         return widths
     # the bound varies slowly: at fine steps it is computed at some states, and used for those that follow
     stride = max(1, every // SAMPLED)
-    carried, deltas = np.empty((size, 0, size)), np.empty(0)  # carried[:, k]: the rounding of step k, propagated
+    carried = np.empty((size, 0, size))  # [:, k]: the rounding of step k, propagated
+    deltas = np.empty(0)
     together = max(1, PART // (every * qd.shape[1]))  # blocks whose Jacobians are computed at once
     for first in range(0, blocks, together):
         part = slice(first * every, min(first + together, blocks) * every)
