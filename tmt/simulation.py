@@ -16,8 +16,7 @@ from tmt.model.tree import Tree, checked_model
 from tmt.model.values import shown
 
 Array = np.ndarray
-# runs and steps whose states are held at once where each is looked at
-RUNS, STEPS = 64, 1024
+STATES = 65_536  # that are held at once where each is looked at
 
 
 class _Path(NamedTuple):
@@ -132,25 +131,24 @@ def by_series(tree: Tree, q: Array, qd: Array, tau: Array, dt: float, every: int
 def in_blocks(
     runner: Runner, q: Array, qd: Array, tau: Array, dt: float, tolerance: float, every: int
 ) -> Ended:
-    """Fill the paths where Mbar may be singular: a block of runs and steps at a time, as each is looked at."""
+    """Fill the paths where Mbar may be singular: a block of steps at a time, as each is looked at."""
     ended, evaluations, steps = np.full(len(q), None, dtype=object), 0, (q.shape[1] - 1) * every
+    runs, start, carried = np.arange(len(q)), (q[:, 0], qd[:, 0]), runner.carried(len(q), dt)
     q[:, 1:], qd[:, 1:] = np.nan, np.nan
-    for first_run in range(0, len(q), RUNS):
-        runs = np.arange(first_run, min(first_run + RUNS, len(q)))
-        start, carried = (q[runs, 0], qd[runs, 0]), runner.carried(len(runs), dt)
-        for first in range(0, steps, STEPS):
-            count = min(STEPS, steps - first)
-            block_q, block_qd = (np.full((len(x), count + 1, x.shape[1]), np.nan) for x in start)
-            block_q[:, 0], block_qd[:, 0] = start
-            codes, taken = runner.follow(block_q, block_qd, tau[runs], dt, tolerance, 1, carried)
-            ended[runs] = reasons(runner.tree, block_q, block_qd, codes, dt, tolerance, first)
-            evaluations += taken
-            kept = np.arange(-first % every, count + 1, every)
-            for path, block in ((q, block_q), (qd, block_qd)):
-                path[runs[:, None], (first + kept) // every] = block[:, kept]
-            alive = np.array([why is None for why in ended[runs]], bool)
-            runs, start = runs[alive], (block_q[alive, -1], block_qd[alive, -1])
-            carried = np.roll(carried[alive], 2, axis=1)
+    size = max(1, STATES // max(1, len(q)))
+    for first in range(0, steps, size):
+        count = min(size, steps - first)
+        block_q, block_qd = (np.full((len(x), count + 1, x.shape[1]), np.nan) for x in start)
+        block_q[:, 0], block_qd[:, 0] = start
+        codes, taken = runner.follow(block_q, block_qd, tau[runs], dt, tolerance, 1, carried)
+        ended[runs] = reasons(runner.tree, block_q, block_qd, codes, dt, tolerance, first)
+        evaluations += taken
+        kept = np.arange(-first % every, count + 1, every)
+        for path, block in ((q, block_q), (qd, block_qd)):
+            path[runs[:, None], (first + kept) // every] = block[:, kept]
+        alive = np.array([why is None for why in ended[runs]], bool)
+        runs, start = runs[alive], (block_q[alive, -1], block_qd[alive, -1])
+        carried = np.roll(carried[alive], 2, axis=1)
     return ended, evaluations
 
 

@@ -111,8 +111,7 @@ def test_where_mbar_may_be_singular_blocks_of_steps_and_runs_have_the_bits_of_a_
 ):
     tree, q, qd = wrist(), [0.5, 0.8, 1.0], [0.3, 0.0, -0.2]
     whole = tmt.simulate(tree, q, qd, Z, 1e-3, 60, method)
-    monkeypatch.setattr(simulation, "STEPS", 7)
-    monkeypatch.setattr(simulation, "RUNS", 2)
+    monkeypatch.setattr(simulation, "STATES", 7)
     few = tmt.simulate(tree, q, qd, Z, 1e-3, 60, method, every=20)
     assert np.array_equal(few.q, whole.q[::20]) and np.array_equal(few.qd, whole.qd[::20])
     assert few.ended is whole.ended is None and few.evaluations == whole.evaluations

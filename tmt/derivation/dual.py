@@ -42,19 +42,14 @@ class Dual:
 
     __radd__ = __add__
 
-    def __sub__(self, other: Scalar) -> Scalar:
-        if isinstance(other, float):
-            return self if other == 0.0 else self.new(self.value - other, self.slope)
-        if self.outranked(other):
-            return other.__rsub__(self)
-        value, slope = self.parts(other)
-        return self.new(self.value - value, self.slope - slope)
-
     def __neg__(self) -> "Dual":
         return self.new(-self.value, -self.slope)
 
+    def __sub__(self, other: Scalar) -> Scalar:
+        return self + -other
+
     def __rsub__(self, other: Scalar) -> Scalar:
-        return self * -1.0 + other
+        return -self + other
 
     def __mul__(self, other: Scalar) -> Scalar:
         if isinstance(other, float):
