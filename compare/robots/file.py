@@ -97,13 +97,7 @@ def rounded(numbers: Sequence[float] | None) -> tuple[str, ...]:
 
 def names_of_keys(file: RobotFile) -> dict[str, str]:
     """The name of the posture of each keyframe: that of the keyframe, different from OWN_POSTURES."""
-    names = {}
-    for name in file.keyframes:
-        unique = name
-        while unique in OWN_POSTURES or (unique != name and unique in file.keyframes):
-            unique = f"key {unique}"
-        names[name] = unique
-    return names
+    return {name: f"key {name}" if name in OWN_POSTURES else name for name in file.keyframes}
 
 
 def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tuple[float, ...]]:

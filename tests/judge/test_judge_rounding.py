@@ -78,20 +78,6 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     assert 0.85 < step_rounding(EULER, *at)[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
 
 
-def test_a_bound_is_of_one_joint_in_its_unit():
-    """A heavy cart with a light disc: the cart's bound in m/s2 knows nothing of the disc's in rad/s2."""
-    link = dataclasses.replace(
-        TURN, joint_names=("rail", "turn"), parent=(-1, 0), offset=((0.0, 0.0, 0.0),) * 2, kind=("slide", "hinge"),
-        axis=((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)), damping=(0.0, 0.0), body_names=("cart", "disc"), body_joint=(0, 1),
-        mass=(50.0, 0.0), com=((0.0, 0.0, 0.0),) * 2, inertia=(TURN.inertia[0], tuple(map(tuple, 1e-12 * np.eye(3)))),
-        armature=(), stiffness=(), rest=(), reference=(),
-    )  # fmt: skip
-    q, qd, tau = np.zeros((1, 2)), np.zeros((1, 2)), np.array([5.0, 0.0])
-    _, size, bound = slope_rounding(METHODS["rk4"], link, q, qd, tau, 0.1)
-    expected = 64 * EPS * np.array([[10.0 / 50.0, np.sqrt(50.0 * 1e-12) * 0.1 / 1e-12]])
-    assert np.allclose(size, [[0.1, 0.0]]) and np.allclose(bound, expected, rtol=1e-9, atol=0.0)
-
-
 @pytest.mark.parametrize("every", [1, 64])
 def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every):
     """J of the disc is ((1, dt), (0, 1)): an error of rate becomes m dt times as much of angle after m steps."""

@@ -40,7 +40,7 @@ def number_of_checks(name, result) -> str:
 
 
 def report_of_arm(small, folder) -> str:
-    """report.md of all experiments on the arm, its figures not rendered: what is wrong with these, test_drawn_figures sees."""
+    """report.md of all experiments on the arm, its figures not rendered."""
     sections = []
     for name in NAMES:
         section = examine.section_with(name, small(name), ARM)

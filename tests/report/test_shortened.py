@@ -7,14 +7,11 @@ import os
 import random
 import re
 import shutil
-import subprocess
-import sys
-from dataclasses import dataclass, make_dataclass, replace
+from dataclasses import dataclass, make_dataclass
 
 import pytest
 from helpers.in_process import without_workers
 from helpers.runs import ROOT, compare, in_shell
-from helpers.sections import BAD, GOOD, section
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -23,11 +20,8 @@ from compare.__main__ import main
 from compare.core.rows import Row, column
 from compare.core.text import aligned, cell, escaped
 from compare.core.words import in_one_line
-from compare.experiments import EXPERIMENTS
 from compare.report import files, style, tables
-from compare.report.document import Document
 from compare.report.terminal import Terminal
-from compare.report.verdict import Report
 from compare.robots.arm import ARM
 
 
@@ -44,10 +38,6 @@ class Compared(Row):
     unknown: float | None = column(optional=True)
 
 
-def runs(count):
-    return [Compared(at=k, share=0.01 * k) for k in range(count)]
-
-
 def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
     rows = [Compared(at=2, share=1.23456789), Compared(at=3, share=math.inf, unknown=2.0)]
     table = tables.of_rows(rows)
@@ -56,25 +46,6 @@ def test_a_table_has_the_digits_of_its_columns_and_lists_are_cut():
     assert first == ["2", "1.23", "True", "0", "1.234568", f"{76 * 'x'} ...", ""]
     assert second[1] == "" and second[6] == "2"
     assert tables.of_rows(rows, ["share"]).to_dict("list") == {"share": ["1.23", ""]}
-
-
-def text_of(*sections):
-    return Document(
-        Report(sections, replace(ARM, questions=()), {"command": "c"}, "Worst in <i>.", (), ())
-    ).text()
-
-
-def test_report_md_is_short_whatever_there_is_to_say():
-    sections = []
-    for name in EXPERIMENTS:
-        of = section(name, GOOD, *[BAD] * 50, rows=runs(405), figures=[f"{name}_{k}" for k in range(10)])
-        of.result.notes = [f"Note {k} of {name}." for k in range(12)]
-        sections.append(of)
-    text = text_of(*sections)
-    assert len(text.splitlines()) <= 1000
-    for name in EXPERIMENTS:
-        parts = f"Note 11 of {name}.", f"(tables/{name}.csv)", f'"figures/{name}_9.png"'
-        assert all(part in text for part in parts)
 
 
 MARKDOWN = MarkdownIt("commonmark", {"html": True}).enable(["table", "strikethrough"])
@@ -135,16 +106,6 @@ def test_in_a_table_on_the_terminal_and_in_a_figure(capsys):
     style.pixels(figure)
     formulas = [of.get_text() for of in figure.findobj(Text) if "$" in of.get_text() and of.get_parse_math()]
     assert formulas and all("mathdefault" in text for text in formulas)
-
-
-def test_letters_that_no_font_has_are_drawn_without_a_word():
-    """In a process of its own: pytest shows every warning."""
-    drawing = "figure = Figure(); figure.text(0, 0, '\u5173\u8282 \U00013000'); print(style.pixels(figure).size > 0)"
-    code = f"from compare.report import style; from matplotlib.figure import Figure; {drawing}"
-    run = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, encoding="utf-8"
-    )
-    assert (run.stdout.split(), run.stderr) == (["True"], "")
 
 
 OLD = "LC_ALL=C PYTHONUTF8=0 PYTHONCOERCECLOCALE=0"

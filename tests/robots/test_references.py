@@ -1,10 +1,7 @@
 """Which reference a file is compared with, how joints are matched, and the first lines of the output and of the report."""
 
-from collections import Counter
 from pathlib import Path
-from xml.etree import ElementTree
 
-import mujoco
 import numpy as np
 import pytest
 from helpers.edited import XML
@@ -69,39 +66,6 @@ def test_bodies_of_a_solution_are_found_on_their_joints(tmp_path):
     engines = [compared_with(first, second).mujoco, compared_with(second, first).mujoco]
     masses = [engine.model.body_mass[engine.bodies].tolist() for engine in engines]
     assert [of_bodies[-2:] for of_bodies in masses] == [[1.0, 2.0], [2.0, 1.0]]
-
-
-OWNERS = {mujoco.MjSpec: "from_file from_string compile", mujoco.MjModel: "from_xml_path from_xml_string"}
-OWNERS[ElementTree] = "iterparse"
-
-
-@pytest.fixture
-def counts(monkeypatch):
-    counts = Counter()
-
-    def count(owner, name):
-        function = getattr(owner, name)
-
-        def counted(*arguments, **options):
-            counts[name] += 1
-            return function(*arguments, **options)
-
-        monkeypatch.setattr(owner, name, counted)
-
-    for owner, names in OWNERS.items():
-        for name in names.split():
-            count(owner, name)
-    return counts
-
-
-@pytest.mark.parametrize("words", [
-    ["parameters", "--mjcf", str(PATHS["gripper"])], ["kinematics", "--mjcf", str(ARM.mjcf), "--reference", "arm"],
-])  # fmt: skip
-def test_a_file_is_parsed_and_compiled_once(inside, tmp_path, counts, words):
-    assert main([*words, "--quick", "--out", str(tmp_path / "out")]) == 0
-    # iterparse: for pipes among the files that it includes, for which MuJoCo would wait
-    again = words[0] == "parameters"  # without the options that change numbers
-    assert counts == {"iterparse": 1, "from_file": 1, "compile": 1 + again}
 
 
 SWINGS = """<robot name="r"><link name="base"/><joint name="j" type="revolute"><parent link="base"/><child link="rod"/>

@@ -37,9 +37,6 @@ def test_postures_are_the_keyframes_qpos0_and_the_middle_and_no_two_are_equal():
     assert list(ranged.poses) == ["qpos0", "middle"] and ranged.scenes[0].posture == "middle"
     alone = robot_of(file_of(arm), "my.xml")
     assert list(alone.poses) == ["qpos0"] and alone.scenes[0].posture == "qpos0" and alone.is_read
-    keys = {name: np.full(3, 0.1 * k) for k, name in enumerate(["qpos0", "key qpos0"], start=1)}
-    robot = robot_of(file_of(arm, keyframes=keys), "my.xml")
-    assert list(robot.poses) == ["key key qpos0", "key qpos0", "qpos0"]
     reading = read(PATHS["pendulum_ball"])  # quaternions of one turn are one posture
     turned = replace(reading, keyframes={"turned": -reading.qpos0})
     ranged = replace(reading, keyframes={}, ranges=((0.0, 1.0),) * 2)  # a ball's range is not of q

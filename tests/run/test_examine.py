@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from compare.__main__ import main
 from compare.cli import command_line
 from compare.core.check import Result
+from compare.core.finding import Finding
 from compare.core.text import environment
 from compare.experiments import EXPERIMENTS, Experiment
 from compare.experiments.options import AllOptions, Options
@@ -23,6 +24,7 @@ from compare.process.workers import Clock
 from compare.report.terminal import Terminal
 from compare.robots.arm import ARM
 from compare.run import command
+from compare.run import drawing as drawings
 from compare.run import examine as experiment
 
 
@@ -215,3 +217,13 @@ def test_after_an_interrupt_there_is_what_has_ended_with_the_figures_that_are_dr
     sections = run.finished().sections
     assert [[figure.file for figure in part.figures] for part in sections] == [["mass"], [], []]
     assert [path.name for path in (tmp_path / "figures").iterdir()] == ["mass.png"]
+
+
+def test_no_figure_overwrites_one_whose_name_differs_in_its_case_alone(tmp_path, monkeypatch):
+    caption = Finding("mass", "summary", {})
+    calls = [lambda file=file: (file, None, caption) for file in ("m_a", "M_A", "m_a")]
+    experiment = SimpleNamespace(figures=lambda result, robot: calls, overview=lambda results, robot: ())
+    monkeypatch.setattr(drawings, "functions", lambda name: experiment)
+    monkeypatch.setattr(drawings.images, "save_figure", lambda figure, path: path.touch())
+    drawn = drawings.draw("mass", Result("mass"), ARM, tmp_path, {})
+    assert len({figure.file.casefold() for figure in drawn}) == len([*tmp_path.iterdir()]) == 3
