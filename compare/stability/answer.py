@@ -12,12 +12,14 @@ from ..engines.mujoco.inventory import light_joints
 from ..engines.mujoco.names import element_name
 from ..engines.mujoco.reading import Reading
 from .motion import Posture, motion_of
-from .push import DAMPED, FAST, PUSHES, USUAL, WAYS, WITHIN, Limit, Pushed
+from .push import PUSHES, USUAL, WITHIN, Limit, Pushed
 from .remedies import Remedy, creep_stops, remedies, shorter_steps
+from .runs import FAST, WAYS, Trial
 from .search import largest
 
 DRAWN = (0.03, 0.1, 0.3)  # rad/s or m/s: pushes of the picture
 CREEPS = 1e-4  # rad/s or m/s: what should rest and is faster
+DAMPED = 0.5  # of the speed that fine runs keep: a step that leaves less damps
 LONGEST_PERIOD = 0.5  # s, of a program
 LONGER = 1.2  # fold: a limit that is told beside another one
 EARTH = 30.0  # m/s2: a larger gravity is stated in another unit of length
@@ -79,6 +81,11 @@ class StepLimitRow(Row):
     def is_damped(self) -> bool:
         return self.kept is not None and self.kept < DAMPED
 
+    @property
+    def used_s(self) -> float:
+        """The step, or the period, in use."""
+        return self.file_dt_s if self.of == "step" else self.period_s or 0.0
+
 
 @dataclass(kw_only=True)
 class TriedRow(Row):
@@ -139,112 +146,97 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
     """The answer to a question. ValueError where nothing moves, or no actuator is there for a program."""
     if not reading.model.nv:
         raise ValueError("nothing moves")
-    period, delay = question.control_period, question.delay or 0.0
+    period = question.control_period
     motion = motion_of(reading, posture, question.recorded, question.kp, question.kv, period is not None)
-    pushed = Pushed(motion, question.dt, question.integrator, question.push, period or 0.0, delay)
+    pushed = Pushed(
+        motion, question.dt, question.integrator, question.push, period or 0.0, question.delay or 0.0
+    )
     pushed.find_truth(PUSHES[-1] if question.drawn else USUAL)
-    rows = [row_of(pushed, name, question) for name in question.integrators]
-    own, found, stops = next((row for row in rows if row.integrator == question.integrator), None), [], []
-    if question.drawn and rows[0].judged_by == "rest" and period is None:
+    found = Answer(
+        [row_of(pushed, name, question) for name in question.integrators], [], [], [], [], None, {}
+    )
+    row, own = found.rows[0], found.own
+    if question.drawn and row.judged_by == "rest" and period is None:
         for push in DRAWN:
             for name in question.integrators if push <= pushed.survived else ():
                 pushed.limit(push, name, surely=push == pushed.push)
-    smaller = None
     if question.helped and own and own.stable_at_file_dt is False:
-        found = remedies(pushed) if period is None else shorter_steps(pushed)
-        smaller = smaller_push(pushed, own)
-    if question.helped and rows[0].creep_rad_per_s > CREEPS:
-        stops = creep_stops(pushed, pushed.creep()[1])
-    tried = [
-        TriedRow(
-            posture=posture.name, integrator=name, push_rad_per_s=push, dt_s=dt, outcome=verdict.why or "holds",
-            end_speed_rad_per_s=known(verdict.speed), apart=known(verdict.apart),
-        )
-        for (push, dt, name, *_), verdict in pushed.tried.items()
-    ]  # fmt: skip
-    first = {row.moves_first for row in rows}
-    light = {name: numbers for name, numbers in light_joints(reading.model).items() if name in first}
-    return Answer(rows, tried, found, stops, recipes_of(pushed, own), smaller, light)
-
-
-def recipes_of(pushed: Pushed, row: StepLimitRow | None) -> list[dict[str, Any]]:
-    """The recipes of the runs at the limits of a row, see Pushed.recipe."""
-    limits = {False: row.stable_up_to_s, True: row.fails_at_s} if row and row.of == "step" else {}
-    found = [pushed.recipe(dt, pushed.integrator, fails) for fails, dt in limits.items() if dt]
-    return [recipe for recipe in found if recipe]
+        helps = remedies(pushed) if period is None else shorter_steps(pushed)
+        found = found._replace(remedies=helps, smaller=smaller_push(pushed, own))
+    if question.helped and row.creep_rad_per_s > CREEPS:
+        found = found._replace(stops=creep_stops(pushed, pushed.creep()[1]))
+    for trial, verdict in pushed.tried.items():
+        found.tried.append(TriedRow(
+            posture=posture.name, integrator=trial.integrator, push_rad_per_s=trial.push, dt_s=trial.dt,
+            outcome=verdict.why or "holds", end_speed_rad_per_s=known(verdict.speed), apart=known(verdict.apart),
+        ))  # fmt: skip
+    for dt in (own.stable_up_to_s, own.fails_at_s) if own and own.of == "step" else ():
+        if dt and (recipe := pushed.recipe(dt, pushed.integrator)):
+            found.recipes.append(recipe)
+    light, first = light_joints(reading.model), {row.moves_first for row in found.rows}
+    return found._replace(light={name: numbers for name, numbers in light.items() if name in first})
 
 
 def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:
     """The row of an integrator."""
-    model, push, dt = pushed.model, pushed.push, question.dt
-    fine = [pushed.fine_run(push, way) for way in range(WAYS)]
+    model, push, dt, period = pushed.model, pushed.push, question.dt, question.control_period
     creep, dof = pushed.creep()
     row = StepLimitRow(
-        posture=pushed.motion.name, integrator=integrator, push_rad_per_s=push, file_dt_s=dt,
-        file_integrator=question.integrator, period_s=question.control_period, delay_s=question.delay,
+        posture=pushed.motion.name, integrator=integrator, of="step" if period is None else "period",
+        push_rad_per_s=push, file_dt_s=dt, file_integrator=question.integrator, period_s=period, delay_s=question.delay,
         survived_rad_per_s=pushed.survived, controls=pushed.motion.controls, run_s=pushed.lasts,
         starts=pushed.starts, creep_rad_per_s=creep, creeping_joint=joint_of(model, dof) if creep else "",
         fine_dt_s=pushed.fine_dt, fine_integrator=pushed.truth, judged_by=pushed.judged_by,
-        end_speed_fine_rad_per_s=known(max(float(run.last.max()) for run in fine)), unit=unit_of(model),
-        by_itself=pushed.by_itself, unpushed_rad_per_s=known(float(pushed.fine_run(0.0, 0).last.max())),
+        end_speed_fine_rad_per_s=known(max(run.speed for run in pushed.fine_runs(push))), unit=unit_of(model),
+        by_itself=pushed.by_itself, unpushed_rad_per_s=known(pushed.unpushed.speed),
     )  # fmt: skip
     if row.judged_by in ("", "falls"):
         return row
     row.place = "by chance" if pushed.place_is_chance(push) else ""
     row.fine_apart = known(max(pushed.twice(push, way) for way in range(WAYS)))
-    if question.control_period is None:
-        limit = pushed.limit(push, integrator)
-        pushed.sure(push, dt, integrator)
-        verdict = pushed.verdict(push, dt, integrator)
-    else:
-        limit, verdict = (
-            period_limit(pushed, integrator),
-            pushed.verdict(push, dt, integrator, pushed.period, pushed.delay),
-        )
-        row.of = "period"
+    limit, trial = limit_of(pushed, row, push), Trial(push, dt, integrator, pushed.period)
+    if period is None:
+        pushed.sure(trial)
+    verdict = pushed.verdict(trial)
     row.stable_up_to_s, row.fails_at_s = limit.stable_up_to, limit.fails_at
     row.moves_first = "" if limit.dof is None else joint_of(model, limit.dof)
-    row.end_speed_file_rad_per_s, row.apart = known(verdict.speed), known(verdict.apart)
+    row.end_speed_file_rad_per_s, row.apart, row.kept = (
+        known(verdict.speed),
+        known(verdict.apart),
+        verdict.kept,
+    )
     row.stable_at_file_dt, row.outcome = verdict.holds, verdict.why or "holds"
-    row.kept = verdict.kept
-    if question.error is not None:
-        within = question.error
 
-        def is_near(step: float) -> bool:
-            tried = pushed.verdict(push, step, integrator)
-            return tried.holds and tried.apart <= within
+    def is_near(step: float) -> bool:
+        tried = pushed.verdict(Trial(push, step, integrator))
+        return tried.holds and tried.apart <= (question.error or 0.0)
 
-        if within > (row.fine_apart or 0.0):  # fine runs know no less
-            row.within_error_s, _ = largest(is_near, dt, pushed.fine_dt, pushed.longest, WITHIN)
+    if (question.error or 0.0) > (row.fine_apart or 0.0):  # fine runs know no less
+        row.within_error_s, _ = largest(is_near, dt, pushed.fine_dt, pushed.longest, WITHIN)
     return row
+
+
+def limit_of(pushed: Pushed, row: StepLimitRow, push: float) -> Limit:
+    """The limit of the step; of a program that of its period, in whole steps in use."""
+    if row.of == "step":
+        return pushed.limit(push, row.integrator)
+    dt, most = pushed.dt, max(LONGEST_PERIOD, pushed.period)
+
+    def whole(period: float) -> Trial:
+        return Trial(push, dt, row.integrator, dt * max(1, round(period / dt)))
+
+    low, high = largest(lambda period: pushed.verdict(whole(period)).holds, pushed.period, dt, most, WITHIN)
+    failing = pushed.verdict(whole(high)).dof if high else None
+    return Limit(low and whole(low).period, high and whole(high).period, failing)
 
 
 def smaller_push(pushed: Pushed, row: StepLimitRow) -> tuple[float, float] | None:
     """The largest smaller push after which the limit is longer by LONGER, and that limit, s."""
-    for push in reversed([push for push in PUSHES if push < pushed.push]) if pushed.rests else ():
-        limit = (
-            pushed.limit(push, row.integrator)
-            if row.of == "step"
-            else period_limit(pushed, row.integrator, push)
-        )
-        if (limit.stable_up_to or 0.0) > LONGER * (row.stable_up_to_s or pushed.fine_dt):
-            return push, limit.stable_up_to or 0.0
+    for push in reversed(PUSHES) if pushed.rests else ():
+        limit = (limit_of(pushed, row, push).stable_up_to or 0.0) if push < pushed.push else 0.0
+        if limit > LONGER * (row.stable_up_to_s or pushed.fine_dt):
+            return push, limit
     return None
-
-
-def period_limit(pushed: Pushed, integrator: str, push: float | None = None) -> Limit:
-    """The longest period of a program, in whole steps in use, and the shortest that fails. push: None, the usual one."""
-    dt, push, delay = pushed.dt, push or pushed.push, pushed.delay
-
-    def whole(period: float) -> float:
-        return dt * max(1, round(period / dt))
-
-    low, high = largest(
-        lambda period: pushed.verdict(push, dt, integrator, whole(period), delay).holds,
-        pushed.period, dt, max(LONGEST_PERIOD, pushed.period), WITHIN,
-    )  # fmt: skip
-    dof = pushed.verdict(push, dt, integrator, whole(high), delay).dof if high else None
-    return Limit(low and whole(low), high and whole(high), dof)
 
 
 def known(value: float) -> float | None:
@@ -255,19 +247,17 @@ def known(value: float) -> float | None:
 def joint_of(model: mujoco.MjModel, dof: int) -> str:
     """The name of the joint; of one without a name that of its body."""
     joint = int(model.dof_jntid[dof])
-    name = model.joint(joint).name
-    return (
-        element_name(model, "joint", joint) if name else element_name(model, "body", model.jnt_bodyid[joint])
-    )
+    if model.joint(joint).name:
+        return element_name(model, "joint", joint)
+    return element_name(model, "body", model.jnt_bodyid[joint])
 
 
 def unit_of(model: mujoco.MjModel) -> str:
     """The unit of speeds: rad/s, m/s, or both; of a file in another unit of length that of the file."""
-    kinds = {int(model.jnt_type[joint]) for joint in model.dof_jntid}
-    turns = kinds - {int(mujoco.mjtJoint.mjJNT_SLIDE)}
-    slides = kinds & {int(mujoco.mjtJoint.mjJNT_SLIDE), int(mujoco.mjtJoint.mjJNT_FREE)}
+    kinds = {mujoco.mjtJoint(model.jnt_type[joint]) for joint in model.dof_jntid}
+    slide, free = mujoco.mjtJoint.mjJNT_SLIDE, mujoco.mjtJoint.mjJNT_FREE
     length = "m/s" if np.linalg.norm(model.opt.gravity) < EARTH else "the file's units a second"
-    return " or ".join(filter(None, ("rad/s" if turns else "", length if slides else "")))
+    return " or ".join(["rad/s"] * bool(kinds - {slide}) + [length] * bool(kinds & {slide, free}))
 
 
 def worst_step(rows: Sequence[StepLimitRow]) -> tuple[bool | None, float | None]:

@@ -106,47 +106,42 @@ def motion_of(
     recorded: "time", s, and controls by the names of actuators, each until the next one. in_program: a program has the file's
     servos or, with gains kp, kv, its motors. ValueError: there are none of them.
     """
-    model = reading.model
-    stepper = Stepper(model, reading.dt, reading.integrator)
-    state = stepper.start(posture.key, q=posture.q or None)
-    place, moves = stepper.places["ctrl"], number_of_actuators(model)
-    stepper.put(state)
-    mujoco.mj_fwdPosition(stepper.model, stepper.data)
-    lengths = stepper.data.actuator_length.copy()
-    holds = reading.drive is not None and reading.drive.feeds_back
-    controls = "keyframe" if posture.key and model.key_ctrl.any() else "servos" if holds else ""
+    model, stepper = reading.model, Stepper(reading.model, reading.dt, reading.integrator)
+    state, place = stepper.start(posture.key, q=posture.q or None), stepper.places["ctrl"]
     if recorded:
         columns = np.tile(state[place], (len(recorded["time"]), 1))
-        for i in range(moves):
+        for i in range(number_of_actuators(model)):
             if (name := element_name(model, "actuator", i)) in recorded:
                 columns[:, control_of(model, i)[0]] = recorded[name]
         return Motion(model, posture.name, state, "record", recorded["time"], columns)
+    holds = reading.drive is not None and reading.drive.feeds_back
+    controls = "keyframe" if posture.key and model.key_ctrl.any() else "servos" if holds else ""
+    ideal = Motion(model, posture.name, state.copy(), controls)
     if not in_program:
-        return Motion(model, posture.name, state, controls)
-    law = program(model, state[place], lengths, kp, kv)
+        return ideal
+    data = stepper.forward(state)
+    law = program(model, state[place], data.actuator_length, kp, kv)
+    if law is None and kp is None and kv is None:
+        raise ValueError("it has no servo: state --kp and --kv of its motors")
     if law is None:
-        if kp is None and kv is None:
-            raise ValueError("it has no servo: state --kp and --kv of its motors")
-        servos = program(model, state[place], lengths, None, None)
+        servos = program(model, state[place], data.actuator_length)
         raise ValueError(
             "it has no motor" + "; a program commands its servos without --kp and --kv" * bool(servos)
         )
-    mujoco.mj_fwdVelocity(stepper.model, stepper.data)
-    ideal = Motion(model, posture.name, state.copy(), controls)
     if kp is not None or kv is not None:
         ideal = ideal._replace(model=with_law(law))
         ideal.state[place][law.places] = 0.0
-    state[place][law.places] = law.controls(stepper.data)
+    state[place][law.places] = law.controls(data)
     return Motion(law.model, posture.name, state, "program", program=law, ideal=ideal)
 
 
 def with_law(law: Program) -> mujoco.MjModel:
     """The model of a program with its law in the actuators, within the ranges of their controls."""
     model = mujoco.MjModel.__copy__(law.model)
-    for i, place in enumerate(law.places):
+    for place, *terms in zip(law.places, law.u, -law.kp, -law.kv):
         gain = model.actuator_gainprm[place, 0]
         model.actuator_biastype[place] = mujoco.mjtBias.mjBIAS_AFFINE
-        model.actuator_biasprm[place, :3] = gain * law.bias[i]
+        model.actuator_biasprm[place, :3] = gain * np.array(terms)
         if model.actuator_ctrllimited[place]:
             ends = np.sort(gain * model.actuator_ctrlrange[place])
             limits = model.actuator_forcerange[place] if model.actuator_forcelimited[place] else ends

@@ -8,7 +8,8 @@ import mujoco
 
 from ..engines.mujoco import changes
 from ..engines.mujoco.stepper import Stepper
-from .push import WAYS, Pushed
+from .push import Pushed
+from .runs import Trial
 from .search import largest
 
 ITERATIONS = 2, 4, 10, 50  # of the solver
@@ -43,11 +44,9 @@ STRENGTHS: dict[str, tuple[Change, float, float]] = {
 def remedies(pushed: Pushed) -> list[Remedy]:
     """The changes with which the step in use holds after the push, by the integrator in use: of each kind the least."""
     found, model = list[Remedy](), pushed.motion.model
-    before = time_of_step(pushed, model)
     for count in ITERATIONS:
-        changed = changes.with_iterations(model, count)
-        if changed is not None and (remedy := confirmed(pushed, changed, "iterations", count)):
-            found.append(remedy._replace(times=(before, time_of_step(pushed, changed))))
+        if remedy := confirmed(pushed, changes.with_iterations(model, count), "iterations", count):
+            found.append(remedy)
             break
     for name, (change, first, most) in STRENGTHS.items():
 
@@ -56,8 +55,7 @@ def remedies(pushed: Pushed) -> list[Remedy]:
             return changed is None or not comes_to_rest(pushed, changed)
 
         _, least = largest(fails, first, first / 100.0, most, WITHIN)
-        changed = None if least is None else change(model, least)
-        if changed is not None and (remedy := confirmed(pushed, changed, name, least or 0.0)):
+        if least is not None and (remedy := confirmed(pushed, change(model, least), name, least)):
             found.append(remedy)
     return found
 
@@ -65,7 +63,7 @@ def remedies(pushed: Pushed) -> list[Remedy]:
 def shorter_steps(pushed: Pushed) -> list[Remedy]:
     """The longest part of the step in use, in ms, with which the program's period holds, if one does."""
     for dt in (pushed.dt / parts for parts in PARTS):
-        verdict = pushed.verdict(pushed.push, dt, pushed.integrator, pushed.period, pushed.delay)
+        verdict = pushed.verdict(Trial(pushed.push, dt, pushed.integrator, pushed.period))
         if verdict.holds:
             return [Remedy("timestep", 1e3 * dt, verdict.speed)]
     return []
@@ -73,26 +71,25 @@ def shorter_steps(pushed: Pushed) -> list[Remedy]:
 
 def comes_to_rest(pushed: Pushed, model: mujoco.MjModel) -> bool:
     """Whether runs of a changed model at the step in use are as still, or as slow, as the file's fine runs."""
-    trial = of_changed(pushed, model)
-    for way in range(WAYS):
-        run, fine = (
-            trial.run(pushed.push, way, pushed.dt, pushed.integrator),
-            pushed.fine_run(pushed.push, way),
-        )
-        if not run.last.max() <= max(pushed.still(pushed.push), fine.last.max()):
-            return False
-    return True
+    changed, trial = of_changed(pushed, model), Trial(pushed.push, pushed.dt, pushed.integrator)
+    still = pushed.still(pushed.push)
+    pairs = enumerate(pushed.fine_runs(pushed.push))
+    return all(changed.run(trial, way).speed <= max(still, fine.speed) for way, fine in pairs)
 
 
-def confirmed(pushed: Pushed, model: mujoco.MjModel, name: str, number: float) -> Remedy | None:
+def confirmed(pushed: Pushed, model: mujoco.MjModel | None, name: str, number: float) -> Remedy | None:
     """The change, if with it the step holds beside fine runs of the changed model; None: it does not."""
-    if not comes_to_rest(pushed, model):
+    if model is None or not comes_to_rest(pushed, model):
         return None
-    trial = of_changed(pushed, model)
-    trial.find_truth()
-    verdict = trial.verdict(pushed.push, pushed.dt, pushed.integrator)
-    borne = trial.survived >= pushed.survived
-    return Remedy(name, float(f"{number:.2g}"), verdict.speed) if borne and verdict.holds else None
+    changed = of_changed(pushed, model)
+    changed.find_truth()
+    verdict = changed.verdict(Trial(pushed.push, pushed.dt, pushed.integrator))
+    borne = changed.survived >= pushed.survived
+    if not (borne and verdict.holds):
+        return None
+    costs = name == "iterations"
+    times = (time_of_step(pushed, pushed.model), time_of_step(pushed, model)) if costs else None
+    return Remedy(name, float(f"{number:.2g}"), verdict.speed, times)
 
 
 def of_changed(pushed: Pushed, model: mujoco.MjModel) -> Pushed:
@@ -102,13 +99,9 @@ def of_changed(pushed: Pushed, model: mujoco.MjModel) -> Pushed:
 
 def creep_stops(pushed: Pushed, dof: int) -> list[Remedy]:
     """How fast a degree of freedom creeps in the unpushed fine run with less slip of contacts; the slowest first."""
-    model, found = pushed.motion.model, []
-    tried = (
-        ("noslip", NOSLIP, changes.with_noslip(model, NOSLIP)),
-        ("impratio", IMPRATIO, changes.changed(model, impratio=IMPRATIO)),
-    )
-    for name, number, changed in tried:
-        trial = of_changed(pushed, changed)
+    found = []
+    for name, field, number in (("noslip", "noslip_iterations", NOSLIP), ("impratio", "impratio", IMPRATIO)):
+        trial = of_changed(pushed, changes.changed(pushed.motion.model, **{field: number}))
         trial.truth = pushed.truth
         found.append(Remedy(name, number, trial.creep(dof)[0]))
     return sorted(found, key=lambda remedy: remedy.speed)
@@ -116,9 +109,7 @@ def creep_stops(pushed: Pushed, dof: int) -> list[Remedy]:
 
 def time_of_step(pushed: Pushed, model: mujoco.MjModel) -> float:
     """The processor time of a step from the start of the motion, s."""
-    stepper = Stepper(model, pushed.dt, pushed.integrator)
-    run = stepper.loop(pushed.motion.state, TIMED)
-    times = []
+    run, times = Stepper(model, pushed.dt, pushed.integrator).loop(pushed.motion.state, TIMED), []
     for _ in range(3):
         begun = time.thread_time()
         run()

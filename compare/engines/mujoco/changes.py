@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .names import bit, control_of, number_of_actuators, output_of
+from .names import control_of, number_of_actuators, on, output_of
 
 NO_BIAS, AFFINE_BIAS = int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE)
 FIXED_GAIN, AFFINE_GAIN = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtGain.mjGAIN_AFFINE)
@@ -109,22 +109,20 @@ def state_inertial(body: mujoco.MjsBody, mass: float, com: np.ndarray) -> None:
 class Program(NamedTuple):
     """A controller outside of MuJoCo: the model that it drives, and the law by which it computes controls.
 
-    places: of its controls, (n,); outputs: of the lengths and speeds that it reads, (n,). Each control is
-    (g0 + g1 l + g2 ldot) u + b0 + b1 l + b2 ldot; gain, bias: (n, 3), u: (n,).
+    places: of its controls; outputs: of the lengths l and speeds that it reads; each control is u - kp l - kv ldot; all (n,).
     """
 
     model: mujoco.MjModel
     places: np.ndarray
     outputs: np.ndarray
-    gain: np.ndarray
-    bias: np.ndarray
     u: np.ndarray
+    kp: np.ndarray
+    kv: np.ndarray
 
     def controls(self, data: mujoco.MjData) -> np.ndarray:
-        """The controls, (n,), for the lengths and speeds of the data, which must be computed: mj_step1."""
+        """The controls, (n,), for the lengths and speeds of the data, which must be computed."""
         lengths, speeds = data.actuator_length[self.outputs], data.actuator_velocity[self.outputs]
-        read = np.stack([np.ones(len(lengths)), lengths, speeds], axis=1)
-        return np.asarray((self.gain * read).sum(axis=1) * self.u + (self.bias * read).sum(axis=1))
+        return np.asarray(self.u - self.kp * lengths - self.kv * speeds)
 
 
 def program(
@@ -137,34 +135,26 @@ def program(
     servos' own law at their controls, (nu,). With kp or kv (of which the other one is 0) it is the motors, whose
     law stays as it is: their control is kp (target - length) - kv speed. lengths: the targets, of each output.
     """
-    copy, given = mujoco.MjModel.__copy__(model), kp is not None or kv is not None
-    places, outputs, gains, biases, us = list[int](), list[int](), [], [], []
+    copy, given, rows = mujoco.MjModel.__copy__(model), kp is not None or kv is not None, []
     for i in range(number_of_actuators(model)):
-        place, inputs = control_of(model, i)
-        is_known = model.actuator_gaintype[i] in (FIXED_GAIN, AFFINE_GAIN) and inputs == 1
-        is_known &= model.actuator_dyntype[i] == mujoco.mjtDyn.mjDYN_NONE
-        gain = model.actuator_gainprm[i, :3] * [1.0, *2 * [model.actuator_gaintype[i] == AFFINE_GAIN]]
-        bias = model.actuator_biasprm[i, :3] * (model.actuator_biastype[i] == AFFINE_BIAS)
-        is_servo = gain[1:].any() or bias[1:].any()
-        is_known &= model.actuator_biastype[i] in (NO_BIAS, AFFINE_BIAS)
-        if not is_known or is_servo == given:
+        (place, inputs), output = control_of(model, i), output_of(model, i)
+        of_gain, of_bias = model.actuator_gaintype[i], model.actuator_biastype[i]
+        gain = model.actuator_gainprm[i, :3] * [1.0, *2 * [of_gain == AFFINE_GAIN]]
+        bias = model.actuator_biasprm[i, :3] * (of_bias == AFFINE_BIAS)
+        is_known = of_gain in (FIXED_GAIN, AFFINE_GAIN) and of_bias in (NO_BIAS, AFFINE_BIAS) and inputs == 1
+        is_servo = bool(gain[1:].any() or bias[1:].any())
+        if not is_known or model.actuator_dyntype[i] != mujoco.mjtDyn.mjDYN_NONE or is_servo == given:
             continue
         u = float(controls[place])
-        if model.actuator_ctrllimited[place] and not model.opt.disableflags & bit("CLAMPCTRL"):
+        if model.actuator_ctrllimited[place] and on(model, "CLAMPCTRL"):
             u = float(np.clip(u, *model.actuator_ctrlrange[place]))
+        law = (gain * u + bias) * [1.0, -1.0, -1.0]
         if given:
-            stiffness, damping = kp or 0.0, kv or 0.0
-            gain, u = np.zeros(3), 0.0
-            bias = np.array([stiffness * lengths[output_of(model, i)], -stiffness, -damping])
+            law = np.array([(kp or 0.0) * lengths[output], kp or 0.0, kv or 0.0])
         else:
             copy.actuator_gaintype[i], copy.actuator_biastype[i] = FIXED_GAIN, NO_BIAS
             copy.actuator_gainprm[i], copy.actuator_biasprm[i] = np.eye(len(copy.actuator_gainprm[i]))[0], 0.0
             copy.actuator_ctrllimited[place] = 0
-        places.append(place)
-        outputs.append(output_of(model, i))
-        gains.append(gain)
-        biases.append(bias)
-        us.append(u)
-    if not places:
-        return None
-    return Program(copy, *map(np.array, (places, outputs, gains, biases, us)))
+        rows.append((place, output, *law))
+    columns = np.array(rows).T
+    return Program(copy, *columns[:2].astype(int), *columns[2:]) if rows else None

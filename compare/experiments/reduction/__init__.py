@@ -29,6 +29,7 @@ from ...robots.case import SEED
 from ...robots.coordinates import Coordinates
 from ...stability.answer import joint_of
 from ...stability.push import Pushed
+from ...stability.runs import Trial
 from ..options import ReductionOptions
 from ..setup import Setup
 from .records import JointRow, ModelRow, UseRow
@@ -90,7 +91,8 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
         pushed = Pushed(motion, reading.dt, reading.integrator)
         pushed.find_truth()
         is_judged = pushed.judged_by not in ("", "falls")
-        verdict = pushed.verdict(pushed.push, reading.dt, reading.integrator) if is_judged else None
+        own = Trial(pushed.push, reading.dt, reading.integrator)
+        verdict = pushed.verdict(own) if is_judged else None
         if (verdict and verdict.why) or not scene.is_finite:
             limit = pushed.limit(pushed.push, reading.integrator).stable_up_to if verdict else None
             joint = joint_of(pushed.model, verdict.dof) if verdict and verdict.dof >= 0 else ""

@@ -14,8 +14,7 @@ from ...judge.run import LEFT, departure, deviation, number_or_none
 from ...robots import Claims, Robot
 from ...stability.equilibrium import Equilibrium, equilibrium
 from .departure import own_torque, variants
-from .subjects import fraction, rk4_of_both
-from .tables import ClaimRow
+from .tables import ClaimRow, rk4_of_both
 
 VARIANT, NEAREST, ONE_ULP = "variant", "nearest to own bias", "one ulp off"  # names of torques
 ABOUT_SO_LATE = 1.0  # s: how near a time is, for "about"
@@ -26,11 +25,21 @@ RUN_BEYOND = 4000  # steps
 DIVERGED_RATE = 1e6  # rad/s: a run that is faster has diverged
 MOVED = 1e-3  # rad: beyond its limit of the step a held robot moves by more
 PUSHED = 1.0  # rad/s2: a robot that a torque accelerates by as much does not stay where it rests
+Engines = Mapping[str, Engine]
 
 
 def claims_of(robot: Robot) -> Claims:
     assert robot.claims is not None
     return robot.claims
+
+
+def fraction(duration: float, dt: float) -> str:
+    """A step that divides a run, as a fraction: 5/64."""
+    return f"{duration:g}/{round(duration / dt)}"
+
+
+def add(result: Result, rows: list[ClaimRow]) -> None:
+    result.tables.setdefault("stability_claims", []).extend(rows)
 
 
 def claim_row(
@@ -48,7 +57,7 @@ def side(path: np.ndarray, left: float | None, dt: float) -> int | None:
     return int(np.sign(away)) if np.isfinite(away) else None
 
 
-def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[ClaimRow]:
+def holding_torques(robot: Robot, engines: Engines) -> list[ClaimRow]:
     """Claim 1: RK4 under all torques within an ulp of TMT's holding torque, then under an engine's own bias."""
     claims, at = claims_of(robot), equilibrium(robot, claims_of(robot).left)
     steps, within, rows = round(WATCHED * claims.duration / claims.dt), variants(at.tau), list[ClaimRow]()
@@ -65,18 +74,17 @@ def holding_torques(robot: Robot, engines: Mapping[str, Engine]) -> list[ClaimRo
 
 def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None:
     """Claim 1: the posture is left after about the claimed time, because of rounding."""
-    result.tables.setdefault("stability_claims", []).extend(torques)
+    add(result, torques)
     claims, reproduced, values = claims_of(robot), True, []
-    for engine, method in dict.fromkeys((row.engine, row.method) for row in torques):
-        mine = [row for row in torques if row.engine == engine]
-        (own,) = (row for row in mine if row.torque == NEAREST)
-        rows, where = [row for row in mine if row is not own], f"{claims.left}, {LABELS[engine]} {method}"
+    for engine in dict.fromkeys(row.engine for row in torques):
+        *rows, own = sorted(
+            (row for row in torques if row.engine == engine), key=lambda r: r.torque == NEAREST
+        )
         if (
             engine == "mujoco"
-        ):  # of TMT no double need be the bias: compiled code rounds its last sum only once
-            quantity = "movement under the engine's own bias"
-            check = result.check(where, quantity, own.moved, 0.0, "rad", about=About.PREDICTION)
-            reproduced &= check.passed
+        ):  # of TMT no double need be the bias: its compiled code rounds the last sum only once
+            where, quantity = f"{claims.left}, {own.who}", "movement under the engine's own bias"
+            reproduced &= result.check(where, quantity, own.moved, 0.0, "rad", about=About.PREDICTION).passed
         gone = [row.observed for row in rows if row.observed is not None]
         close = sum(abs(time - claims.left_after) <= ABOUT_SO_LATE for time in gone)
         reproduced &= 2 * close > len(rows)
@@ -90,9 +98,7 @@ def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None
     )  # fmt: skip
 
 
-def finer_steps(
-    robot: Robot, engines: Mapping[str, Engine], counts: Sequence[int] = STEP_COUNTS
-) -> list[ClaimRow]:
+def finer_steps(robot: Robot, engines: Engines, counts: Sequence[int] = STEP_COUNTS) -> list[ClaimRow]:
     """Claim 2: departure under RK4 against the step, the torque one ulp off to either side at the first joint."""
     claims, at = claims_of(robot), equilibrium(robot, claims_of(robot).left)
     rest, rows = np.zeros_like(at.q), list[ClaimRow]()
@@ -115,7 +121,7 @@ def finer_steps(
 
 def check_finer_steps(result: Result, finer: list[ClaimRow], robot: Robot) -> None:
     """Claim 2: a smaller step reverses the side, and a very small one leaves the robot in place."""
-    result.tables.setdefault("stability_claims", []).extend(finer)
+    add(result, finer)
     claims, still, turned, leave = claims_of(robot), True, 0, True
     series = list(dict.fromkeys((row.engine, row.ulps) for row in finer))
     for engine, sign in series:
@@ -135,7 +141,7 @@ def check_finer_steps(result: Result, finer: list[ClaimRow], robot: Robot) -> No
     )  # fmt: skip
 
 
-def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -> list[ClaimRow]:
+def kept(robot: Robot, engines: Engines, steps: int = RUN_BEYOND) -> list[ClaimRow]:
     """Claim 3: RK4 at the posture that is kept, below and beyond its limit, the torque one ulp off."""
     at, rows = equilibrium(robot, claims_of(robot).kept), list[ClaimRow]()
     for method in rk4_of_both(engines):
@@ -154,39 +160,37 @@ def kept(robot: Robot, engines: Mapping[str, Engine], steps: int = RUN_BEYOND) -
     return rows
 
 
-def accelerations_at_end(robot: Robot, engines: Mapping[str, Engine]) -> dict[str, float]:
+def accelerations_at_end(robot: Robot, engines: Engines) -> dict[str, float]:
     """The largest acceleration at the claimed end under the torque that holds the other posture, rad/s2, by engine."""
     at, q = equilibrium(robot, claims_of(robot).kept), robot.posture(claims_of(robot).end)
-    of = {LABELS[method.engine]: engines[method.engine].of(at.case) for method in rk4_of_both(engines)}
-    return {
-        label: float(np.abs(one.acceleration(q, np.zeros_like(q), at.tau)).max()) for label, one in of.items()
+    values = {
+        name: engines[name].of(at.case).acceleration(q, np.zeros_like(q), at.tau) for name in robot.compared
     }
+    return {LABELS[name]: float(np.abs(value).max()) for name, value in values.items()}
 
 
 def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping[str, float]) -> None:
     """Claim 3: held beyond the limit of RK4. ends: accelerations at the claimed end, rad/s2."""
+    add(result, rows)
     claims, stays, leaves_end, about = claims_of(robot), True, False, About.PREDICTION
     at = equilibrium(robot, claims.kept)
-    limit, rate = at.limit("rk4")[1] or 0.0, float(np.abs(at.modes[0]).max())
-    result.tables.setdefault("stability_claims", []).extend(rows)
+    limit = at.limit("rk4")[1] or 0.0
     for row in (row for row in rows if row.dt < limit):
         where = f"{claims.kept}, {row.who}, dt = {row.dt:.4g} s, torque {row.torque}"
-        run = row.run or 0.0
-        time, what = (
-            run if row.observed is None else row.observed,
-            f"time within {LEFT:g} rad, below the limit",
-        )
+        run, what = row.run or 0.0, f"time within {LEFT:g} rad, below the limit"
+        time = run if row.observed is None else row.observed
         stays &= result.check(where, what, time, run, "s", rule="at least", about=about).passed
     for label, size in ends.items():
-        where = f"{claims.end}, {label}"
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        check = result.check(where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about)
+        check = result.check(
+            f"{claims.end}, {label}", quantity, size, PUSHED, "rad/s2", rule="at least", about=about
+        )
         leaves_end |= check.passed
     above = [row for row in rows if row.dt > limit]
     moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)
     result.find(
         "claim_3", reproduced=("bounded" if leaves_end else "yes") if stays and moves else "no", posture=claims.kept,
-        end=claims.end, noun=robot.noun, limit=limit, rate=rate, above=len(above), ends=ends,
+        end=claims.end, noun=robot.noun, limit=limit, rate=at.fastest, above=len(above), ends=ends,
         diverged=sum(row.diverged_at is not None for row in above),
         farthest=max((row.moved for row in above if row.moved is not None), default=None),
     )  # fmt: skip

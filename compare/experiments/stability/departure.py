@@ -11,7 +11,6 @@ from ...core.check import About, Result
 from ...engines import Engine, Method
 from ...judge.run import LEFT, departure, number_or_none
 from ...stability.equilibrium import NEGLIGIBLE, Equilibrium
-from .subjects import unit_of_movements
 from .tables import DepartureRow
 
 LONGEST_DEPARTURE = 12.0  # s
@@ -26,7 +25,7 @@ INSTANT = 1e-6  # s
 def predicted(
     at: Equilibrium, schemes: Sequence[str], dt: float, moved: np.ndarray, off: np.ndarray
 ) -> np.ndarray:
-    """When each method's own linear map has a joint 0.1 rad or m away, (methods, k) s; NaN: not within 12 s.
+    """When each method's own linear map has a joint 0.1 rad away, (methods, k) s; NaN: not within 12 s.
 
     moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (methods, k, n) N m.
     The map carries all modes of the state about the equilibrium that this torque moves. Each new angle is rounded to a
@@ -34,13 +33,12 @@ def predicted(
     """
     n = at.nv
     changes = np.array([(at.step(scheme, dt) - np.eye(2 * n)).T for scheme in schemes])
-    # a torque along a mode without stiffness has no equilibrium, and is too small to matter
-    compliance = np.linalg.pinv(at.matrix[n:, :n], rcond=NEGLIGIBLE**2)
-    aside = np.linalg.solve(at.mass_matrix, off[..., None])[..., 0] @ compliance.T
-    start = np.broadcast_to(at.sizes + moved, off.shape)
+    forces = np.linalg.solve(at.mass_matrix, off[..., None])[..., 0]
+    aside = forces @ np.linalg.inv(at.matrix[n:, :n]).T
+    start = np.broadcast_to(at.q + moved, off.shape)
     q, qd, times = start, np.zeros_like(start), np.full(off.shape[:-1], np.nan)
     for k in range(1, round(LONGEST_DEPARTURE / dt) + 1):
-        added = np.concatenate([q - at.sizes + aside, qd], axis=-1) @ changes
+        added = np.concatenate([q - at.q + aside, qd], axis=-1) @ changes
         q, qd = q + added[..., :n], qd + added[..., n:]
         gone = ~(np.abs(q - start).max(axis=-1) <= LEFT)
         times[gone & np.isnan(times)] = k * dt
@@ -55,38 +53,33 @@ def is_led(at: Equilibrium, scheme: str, dt: float) -> bool:
     If it does, that mode outgrows the other from what rounding and squares of the deviation put into it, and the linear map
     cannot say when the posture is left.
     """
-    return bool(np.isclose(at.growing_rate(scheme, dt), np.abs(at.modes[0][0]), rtol=NEGLIGIBLE))
+    return bool(np.isclose(at.growing_rate(scheme, dt), np.abs(at.rates[0]), rtol=NEGLIGIBLE))
 
 
 def departures(
     dt: float, at: Equilibrium, engines: Mapping[str, Engine], methods: tuple[Method, ...]
 ) -> list[DepartureRow]:
     """Rows for tables/departure.csv: every method that is led and every perturbation at one dt, from one saddle."""
-    (rate, *_), vectors = at.modes
-    shape, robot = vectors[: at.nv, 0].real / np.abs(vectors[: at.nv, 0]).max(), at.case.robot
-    rows = []
+    rate, shape, rows = at.rates[0].real, at.vectors[: at.nv, 0].real, list[DepartureRow]()
+    shape = shape / np.abs(shape).max()
     sizes = [(size, True) for size in PERTURBATIONS] + [(size, False) for size in TORQUE_ERRORS]
     moved = np.array([size * shape * is_push for size, is_push in sizes])
     # an error of torque that moves the equilibrium by size x shape, as far as doubles can say it
-    force = at.mass_matrix @ shape * rate.real**2
+    force = at.mass_matrix @ shape * rate**2
     errors = np.array([size * force * (not is_push) for size, is_push in sizes])
     led = [method for method in methods if is_led(at, method.scheme, dt)]
     torques = [own_torque(method, engines, at) + errors for method in led]
     off = np.array([residual(method, engines, at, tau) for method, tau in zip(led, torques)])
     expected = predicted(at, [method.scheme for method in led], dt, moved, off.reshape(-1, *moved.shape))
     for method, tau, times in zip(led, torques, expected):
-        longest = (
-            LONGEST_DEPARTURE if np.isnan(times).any() else min(LONGEST_DEPARTURE, AWAITED * times.max())
-        )
+        latest = np.inf if np.isnan(times).any() else AWAITED * times.max()
+        steps, dynamics = math.ceil(min(LONGEST_DEPARTURE, latest) / dt), engines[method.engine].of(at.case)
         with np.errstate(over="ignore", invalid="ignore"):
-            dynamics = engines[method.engine].of(at.case)
-            rest, steps = np.zeros_like(moved), math.ceil(longest / dt)
-            motion = dynamics.run(at.moved(moved), rest, tau, dt, steps, method.name)
+            motion = dynamics.run(at.q + moved, np.zeros_like(moved), tau, dt, steps, method.name)
         for (size, is_push), time, path in zip(sizes, times, motion.q):
             rows.append(DepartureRow(
                 scene=at.name + ("" if is_push else ", torque off"), engine=method.engine, method=method.name,
-                dt=dt, perturbation=size, unit=unit_of_movements(robot), predicted=number_or_none(time),
-                observed=departure(motion.t, path, at.case.coordinates),
+                dt=dt, perturbation=size, predicted=number_or_none(time), observed=departure(motion.t, path),
             ))  # fmt: skip
     return rows
 
@@ -95,14 +88,10 @@ def check_departures(result: Result, rows: list[DepartureRow]) -> None:
     """The table of departures and a check of each: to one step or 0.03 s; where the prediction stays, the run stays."""
     result.tables.setdefault("departure", []).extend(rows)
     for row in rows:
-        off, size = late(row), f"{row.perturbation:.0e} {row.unit}"
-        missing = {"the run stays": row.observed, "the prediction stays": row.predicted}
+        off, missing = late(row), {"the run stays": row.observed, "the prediction stays": row.predicted}
         note = " and ".join(text for text, time in missing.items() if time is None)
-        where, quantity = (
-            f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {size}",
-            "departure, observed - predicted",
-        )
-        value = None if off is None else abs(off)
+        where = f"{row.scene}, {row.who}, dt = {row.dt:.4g} s, {row.perturbation:.0e} rad"
+        value, quantity = None if off is None else abs(off), "departure, observed - predicted"
         result.check(where, quantity, value, near(row), "s", note, about=About.PREDICTION)
 
 
@@ -120,10 +109,10 @@ def near(row: DepartureRow) -> float:
 
 def departure_values(rows: list[DepartureRow]) -> dict[str, Any]:
     """How many departures are as predicted, and the largest difference, s."""
-    off = [late(row) for row in rows]
-    close = [by is not None and abs(by) <= near(row) for by, row in zip(off, rows)]
-    known = [abs(by) for by, row in zip(off, rows) if by is not None and row.observed is not None]
-    return {"count": len(rows), "close": sum(close), "worst": max(known, default=None)}
+    off = [(late(row), row) for row in rows]
+    close = sum(by is not None and abs(by) <= near(row) for by, row in off)
+    known = [abs(by) for by, row in off if by is not None and row.observed is not None]
+    return {"count": len(rows), "close": close, "worst": max(known, default=None)}
 
 
 # torques that hold
@@ -146,8 +135,8 @@ def residual(method: Method, engines: Mapping[str, Engine], at: Equilibrium, tau
 
     Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.
     """
-    start = at.moved(np.zeros_like(tau))
-    motion = engines[method.engine].of(at.case).run(start, np.zeros_like(tau), tau, INSTANT, 1, method.name)
+    start, rest = np.broadcast_to(at.q, tau.shape), np.zeros_like(tau)
+    motion = engines[method.engine].of(at.case).run(start, rest, tau, INSTANT, 1, method.name)
     return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
 
 

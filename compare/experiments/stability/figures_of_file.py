@@ -31,17 +31,13 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
     pushes = sorted({row.push_rad_per_s for row in tried})
     for name, (colour, dash, mark, width) in LOOKS.items():
         looks: dict[str, Any] = {"color": colour, "linestyle": dash, "linewidth": width, "marker": mark}
-        looks["markersize"] = 4
         mine = [row for row in tried if row.integrator == name]
-        held = [(push, longest(mine, push)) for push in pushes]
-        shown = [(step, push) for push, step in held if step]
-        if shown:
-            left.plot(*zip(*shown), label=name, **looks)
-        near = sorted(
-            (row.dt_s, row.apart) for row in mine if row.push_rad_per_s == own.push_rad_per_s and row.apart
-        )
-        if near:
-            right.plot(*zip(*near), label=name, **looks)
+        held = [(step, push) for push in pushes if (step := longest(mine, push))]
+        usual = [row for row in mine if row.push_rad_per_s == own.push_rad_per_s and row.apart]
+        near = sorted((row.dt_s, row.apart) for row in usual)
+        for ax, points in ((left, held), (right, near)):
+            if points:
+                ax.plot(*zip(*points), label=name, markersize=4, **looks)
     left.axhline(own.push_rad_per_s, color="black", linewidth=0.8, linestyle=":")
     left.set(xscale="log", yscale="log", xlabel="dt, s", ylabel=f"largest push that is survived, {own.unit}")
     right.set(xscale="log", yscale="log", xlabel="dt, s", ylabel="distance from fine steps, rad or m")
@@ -50,9 +46,8 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
     left.set_yticks(pushes, [f"{push:g}" for push in pushes])
     left.minorticks_off()
     handles = {line.get_label(): line for ax in (right, left) for line in ax.get_legend_handles_labels()[0]}
-    names = [
-        name for name in LOOKS if name in handles
-    ]  # one without a push that is survived is on the right alone
+    # one without a push that is survived is on the right alone
+    names = [name for name in LOOKS if name in handles]
     fig.legend([handles[name] for name in names], names, loc="outside upper center", ncols=5)
     return "stability_steps", fig, caption(result, own, len(pushes))
 

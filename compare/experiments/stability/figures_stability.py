@@ -1,4 +1,4 @@
-"""Figures: step limits, also of the first screen; growth of a file's steps; departure; claims."""
+"""Figures of the arm: step limits, also of the first screen; departure; claims."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -14,10 +14,9 @@ from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
 from ..figures import MOST_ROWS, chart, named_rows
-from .claims import NEAREST, claims_of
+from .claims import NEAREST, claims_of, fraction
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
-from .subjects import fraction, unit_of_movements
 from .tables import ClaimRow, LimitRow, StabilityResult
 
 SCHEME_LOOKS = {  # colour, dash, name
@@ -45,8 +44,7 @@ def limits_in(
     for row in rows:
         of_scheme.setdefault(known.get((row.engine, row.method), row.method), []).append(row)
     of_scheme = dict(list(of_scheme.items())[:most])
-    steps = [dt for row in rows for dt in (row.predicted_dt, row.observed_dt)]
-    ends = list(filter(None, steps)) or [1e-3, 1.0]
+    ends = [dt for row in rows for dt in (row.predicted_dt, row.observed_dt) if dt]
     low, high = min(ends) / 2, max(ends) * 2
     for place, mine in enumerate(of_scheme.values()):
         for row in mine:
@@ -77,9 +75,7 @@ def limits_in(
     ]
 
 
-def draw_overview(
-    result: StabilityResult, robot: Robot, rows: Sequence[LimitRow]
-) -> tuple[str, Figure, Finding]:
+def draw_overview(result: StabilityResult, rows: Sequence[LimitRow]) -> tuple[str, Figure, Finding]:
     """The limits of the first screen, all postures in one."""
     fig, ax = chart()
     handles = limits_in(ax, rows, result.schemes, MOST_ROWS)
@@ -89,9 +85,7 @@ def draw_overview(
     return "overview_limits", fig, result.finding("overview_caption", **summary(rows))
 
 
-def draw_limits(
-    result: StabilityResult, robot: Robot, rows: Sequence[LimitRow]
-) -> tuple[str, Figure, Finding]:
+def draw_limits(result: StabilityResult, rows: Sequence[LimitRow]) -> tuple[str, Figure, Finding]:
     """The limits scene by scene and damping by damping."""
     panels = list(dict.fromkeys((row.scene, row.damping) for row in rows))
     columns = min(3, len(panels))
@@ -102,24 +96,17 @@ def draw_limits(
         here = [row for row in rows if (row.scene, row.damping) == (scene, damping)]
         handles = limits_in(ax, here, result.schemes)
         ax.set_title(f"{scene}, damping {damping:g}" if damping else scene)
-    for ax in axes.flat[len(panels) :]:
-        ax.set_visible(False)
     fig.supxlabel("largest stable dt, s (damping in N m s/rad)", fontsize=9)
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
-    values: dict[str, Any] = {"deviation": LINEAR_DEVIATION, "unit": unit_of_movements(robot)}
     first = [row for row in rows if (row.scene, row.damping, row.engine) == (*panels[0], "tmt")]
     products = {look(row.method)[2]: row.predicted_dt * row.mode for row in first if row.predicted_dt}
-    caption = result.finding(
-        "figure_limits", posture=panels[0][0], products=products, **values, **summary(rows)
-    )
-    return "stability_limits", fig, caption
+    about: dict[str, Any] = {"deviation": LINEAR_DEVIATION, "posture": panels[0][0], "products": products}
+    return "stability_limits", fig, result.finding("figure_limits", **about, **summary(rows))
 
 
 def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
     """Time to leave a saddle against the size of the perturbation."""
-    unit, table = unit_of_movements(robot), result.tables["departure"]
-    saddle = table[0].scene
-    rows = [row for row in table if row.scene in (saddle, f"{saddle}, torque off")]
+    rows = result.tables["departure"]
     steps = sorted({row.dt for row in rows}, reverse=True)
     fig = Figure(figsize=(WIDTH, 3.9), layout="constrained")
     axes = fig.subplots(1, len(steps), sharey=True, squeeze=False)[0]
@@ -141,11 +128,11 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
                 ax.plot(sizes, observed, MUJOCO_MARKS[k % 3], color="black", markersize=5, label=label)
         ax.set(xscale="log", ylim=(0, None), title=f"dt = {dt:.4g} s")
         ax.minorticks_off()
-    axes[0].set_ylabel(f"time until a movement of {LEFT:g} {unit}, s")
+    axes[0].set_ylabel(f"time until a movement of {LEFT:g} rad, s")
     axes[0].plot([], [], color="black", linewidth=1, label="predicted by the linear map")
-    fig.supxlabel(f"perturbation, {unit}", fontsize=9)
+    fig.supxlabel("perturbation, rad", fontsize=9)
     fig.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=3, fontsize=8)
-    values = {"posture": saddle, "noun": robot.noun, "unit": unit, "left": LEFT}
+    values = {"posture": rows[0].scene, "noun": robot.noun, "left": LEFT}
     return "stability_departure", fig, result.finding("figure_departure", **values, **departure_values(rows))
 
 
@@ -188,10 +175,13 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
         fill = "full" if engine == "tmt" else "none"
         axes[0].plot([], [], "^", color=COLOURS[engine], fillstyle=fill, label=LABELS[engine])
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    about = {
+    about: dict[str, Any] = {
         "dt": fraction(claims.duration, claims.dt),
         "joint": robot.joints[0],
-        "posture": claims.left,
-        "kept": claims.kept,
+        "panels": len(found),
     }
-    return "stability_claims", fig, result.finding("figure_claims", **about, panels=len(found))
+    return (
+        "stability_claims",
+        fig,
+        result.finding("figure_claims", posture=claims.left, kept=claims.kept, **about),
+    )

@@ -37,21 +37,19 @@ def limit_rows(
     at: Equilibrium, engines: Mapping[str, Engine], methods: tuple[Method, ...], steps: int = GROWTH_STEPS
 ) -> list[Observed]:
     """The limits of one posture, of each scheme predicted once, and of each method observed."""
-    found, fastest = list[Observed](), np.abs(at.modes[0]).max()
 
     @cache
-    def expected(scheme: str) -> tuple[str, float | None, float, float, np.ndarray]:
+    def predicted(scheme: str) -> tuple[str, float | None, float, float]:
+        """Kind, limit, rate of the mode that limits, and tolerance; just above the limit its mode grows fastest."""
         kind, limit = at.limit(scheme)
-        tolerance, tried = LIMIT_TOLERANCE, TRIED_OF_FASTEST / fastest
-        if limit:
-            tolerance, tried = limit_tolerance(at, scheme, limit, steps), limit * TRIED_ABOUT
-        rate = fastest
-        if kind != "never_fails":  # just above the limit its mode grows fastest
-            rate = at.growing_rate(scheme, 1.001 * limit if limit else tried[0])
-        return kind, limit, rate, tolerance, tried
+        above = 1.001 * limit if limit else 0.1 / at.fastest
+        rate = at.fastest if kind == "never_fails" else at.growing_rate(scheme, above)
+        return kind, limit, rate, limit_tolerance(at, scheme, limit, steps) if limit else LIMIT_TOLERANCE
 
+    found = list[Observed]()
     for method in methods:
-        kind, limit, rate, tolerance, tried = expected(method.scheme)
+        kind, limit, rate, tolerance = predicted(method.scheme)
+        tried = limit * TRIED_ABOUT if limit else TRIED_OF_FASTEST / at.fastest
         seen, observed = observed_limit(method, engines, at, steps, tried)
         row = LimitRow(
             scene=at.name, engine=method.engine, method=method.name, damping=at.damping, mode=rate,
@@ -86,40 +84,29 @@ def shares(
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
     All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
-    a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel.
+    a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel. Of modes
+    that decay those that move within a quarter are seen: squares of the fast ones move what the slow ones swing about.
     """
-    n, vectors, difference = at.nv, at.shapes, at.case.coordinates.difference
-    quarter = quarter_of(at, dt, steps)
-    start = LINEAR_DEVIATION * vectors.sum(axis=1).real / (2 * n)
+    n, quarter = at.nv, quarter_of(at, dt, steps)
+    start = LINEAR_DEVIATION * at.shapes.sum(axis=1).real / (2 * n)
     weight = np.hanning(quarter + 2)[1:-1]
     weight /= weight.sum()
-    dynamics = engines[method.engine].of(at.case)
+    seen = (at.rates.real > at.small) | (np.abs(at.rates) * quarter * dt >= 2.0 * np.pi)
+    seen |= not seen.any()
     with np.errstate(over="ignore", invalid="ignore"):
-        motion = dynamics.run(at.moved(start[:n]), start[n:], at.tau, float(dt), 4 * quarter, method.name)
-        parts = (slice(0, 1), slice(quarter + 1, 2 * quarter + 1), slice(3 * quarter + 1, None))
-        deviations = (
-            np.concatenate([difference(motion.q[part], at.q), motion.v[part]], axis=1) for part in parts
-        )
-        first, *later = (np.abs(off @ at.measures.T) ** 2 for off in deviations)
-        seen = is_seen(at.modes[0][~at.without_stiffness], at.small, quarter * dt)
-        return [np.sqrt(weight @ part / first[0])[seen] for part in later]
-
-
-def is_seen(rates: np.ndarray, small: float, duration: float) -> np.ndarray:
-    """Which modes a run shows, by their rates, 1/s: those that grow, and those that move within `duration`, s.
-
-    Squares of the fast modes move what the slow ones swing about.
-    """
-    seen = (rates.real > small) | (np.abs(rates) * duration >= 2.0 * np.pi)
-    return seen if seen.any() else np.ones_like(seen)
+        dynamics = engines[method.engine].of(at.case)
+        motion = dynamics.run(at.q + start[:n], start[n:], at.tau, float(dt), 4 * quarter, method.name)
+        deviation = np.concatenate([motion.q - at.q, motion.v], axis=1)
+        sizes = np.abs(deviation @ np.linalg.inv(at.shapes).T) ** 2
+        parts = sizes[quarter + 1 : 2 * quarter + 1], sizes[3 * quarter + 1 :]
+        return [np.sqrt(weight @ part / sizes[0])[seen] for part in parts]
 
 
 def quarter_of(at: Equilibrium, dt: float, steps: int) -> int:
     """Steps of a quarter of a run: a quarter of `steps`, and at least a swing of the slowest mode."""
-    swings = at.modes[0].imag[at.modes[0].imag > 1e-3]
-    if not len(swings):
-        return steps // 4
-    return max(steps // 4, int(np.ceil(2.0 * np.pi / (swings.min() * dt))))
+    swings = at.rates.imag[at.rates.imag > 1e-3]
+    slowest = int(np.ceil(2.0 * np.pi / (swings.min() * dt))) if len(swings) else 0
+    return max(steps // 4, slowest)
 
 
 def limit_tolerance(at: Equilibrium, scheme: str, limit: float, steps: int) -> float:
@@ -161,9 +148,7 @@ def check_limits(result: Result, limits: Sequence[Observed]) -> None:
             quantity, same = f"runs in which it {KINDS[row.limit]}, as predicted", int(kind == row.limit)
             check = result.check(where, quantity, same, 1, "runs", rule="equal", about=About.PREDICTION)
             row.passed = check.passed
-    result.shown = [
-        name for row in result.rows[:1] for name in row.record() if name not in ("criterion", "passed")
-    ]
+    result.shown = [name for name in result.rows[0].record() if name not in ("criterion", "passed")]
 
 
 def summary(rows: Sequence[LimitRow]) -> dict[str, Any]:

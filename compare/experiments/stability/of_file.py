@@ -1,8 +1,7 @@
 """Which step of a file is stable: begins the work of compare/stability, and says what it found."""
 
-from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
 from ...core.finding import Finding
@@ -12,23 +11,14 @@ from ...stability.answer import CREEPS, Answer, Question, StepLimitRow, answer
 from ...stability.motion import Posture, posture_of, postures_of
 from ..options import StabilityOptions
 from ..setup import Setup
-from .tables import StabilityResult
+from .tables import Runs, StabilityResult
 
 OF = "of_file"  # the template
 DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
 AT_PERIOD = "stable at its control period"
 
 
-class Work(NamedTuple):
-    """What `begin` starts. quantity: of the checks."""
-
-    quantity: str
-    answers: Iterable[Answer | str]
-    is_alone: bool
-    error: float | None  # rad or m, of --error
-
-
-def begin(setup: Setup, reading: Reading) -> Work:
+def begin(setup: Setup, reading: Reading) -> list[Runs]:
     """Start the work: all integrators at the first posture or the one that is asked for, the file's own at the others.
 
     A quick run has the file's integrator and Euler; one of several experiments the first posture alone.
@@ -45,57 +35,57 @@ def begin(setup: Setup, reading: Reading) -> Work:
     tasks = [(posture, others if number else question) for number, posture in enumerate(postures)]
     quantity = AT_PERIOD if asked.control_period else AT_REQUESTED_STEP if asked.dt else AT_OWN_STEP
     found = setup.map(partial(answer_of, reading=reading), tasks if setup.alone else tasks[:1])
-    return Work(quantity, found, setup.alone, asked.error)
+    return [Runs(found, partial(add, quantity=quantity, is_alone=setup.alone, error=asked.error))]
 
 
-def answer_of(task: tuple[Posture, Question], reading: Reading) -> Answer | str:
+def answer_of(task: tuple[Posture, Question], reading: Reading) -> list[Answer | str]:
     """The answer at a posture; why there is none."""
     try:
-        return answer(reading, *task)
+        return [answer(reading, *task)]
     except ValueError as error:
-        return str(error)
+        return [str(error)]
 
 
-def add(result: StabilityResult, work: Work) -> None:
-    """Rows, checks, and what is said: the answer first, then what a user must know of it, what helps, the other postures."""
-    answers, reasons = list[Answer](), dict[str, None]()
-    for found in work.answers:
-        if isinstance(found, str):
-            reasons[found] = None
-        else:
-            answers.append(found)
-    for reason in reasons:  # once for all postures
-        result.not_judged("", work.quantity, reason, about=About.STEP)
+def add(
+    result: StabilityResult, found: list[Answer | str], quantity: str, is_alone: bool, error: float | None
+) -> None:
+    """Rows, checks, and what is said: the answer first, then what a user must know of it, what helps, the other postures.
+
+    quantity: of the checks. error: rad or m, of --error.
+    """
+    answers = [each for each in found if isinstance(each, Answer)]
+    reasons = dict.fromkeys(each for each in found if isinstance(each, str))  # once for all postures
+    for reason in reasons:
+        result.not_judged("", quantity, reason, about=About.STEP)
     if not answers:
         return
-    rows = [row for found in answers for row in found.rows]
-    result.tables["step_limits"] = rows
-    result.tables["stability_runs"] = [row for found in answers for row in found.tried]
+    result.tables["step_limits"] = [row for each in answers for row in each.rows]
+    result.tables["stability_runs"] = [row for each in answers for row in each.tried]
     result.filed = ["stability_runs"]
-    for found in answers:
-        check(result, found.rows[0], work.quantity)
-    result.repeated["runs"] = answers[0].recipes
-    first, others = answers[0], [found.rows[0] for found in answers[1:]]
-    tell(result, "answer", row=first.rows[0], rows=first.rows if work.is_alone else [])
-    if work.error is not None:
-        tell(result, "within", rows=first.rows, error=work.error)
-    tell_of_row(result, first.rows[0])
+    for each in answers:
+        check(result, each.rows[0], quantity)
+    first, row, rows = answers[0], answers[0].rows[0], answers[0].rows
+    result.repeated["runs"] = first.recipes
+    tell(result, "answer", row=row, rows=rows if is_alone else [])
+    if error is not None:
+        tell(result, "within", rows=rows, error=error)
+    tell_of_row(result, row)
     for joint, (inertia, mass, least) in first.light.items():
         tell(result, "light", joint=joint, inertia=inertia, mass=mass, least=least)
-    damped = [row for row in first.rows if row.is_damped]
-    if damped:
+    if damped := [row for row in rows if row.is_damped]:
         tell(result, "damps", rows=damped)
-    if first.rows[0].stable_at_file_dt is False:
-        stable = [row.integrator for row in first.rows if row.stable_at_file_dt]
+    if row.stable_at_file_dt is False:
+        stable = [row.integrator for row in rows if row.stable_at_file_dt]
         if first.smaller:
-            tell(result, "smaller", row=first.rows[0], push=first.smaller[0], limit=first.smaller[1])
-        if stable or first.remedies or first.rows[0].of == "step":
-            tell(result, "remedies", row=first.rows[0], integrators=stable, remedies=first.remedies)
-    if first.rows[0].creep_rad_per_s > CREEPS:
-        tell(result, "creep", row=first.rows[0], stops=first.stops)
-    if others:
-        unstable = [row for row in others if row.stable_at_file_dt is False]
-        tell(result, "others", rows=others, unstable=unstable)
+            tell(result, "smaller", row=row, push=first.smaller[0], limit=first.smaller[1])
+        if stable or first.remedies or row.of == "step":
+            tell(result, "remedies", row=row, integrators=stable, remedies=first.remedies)
+    if row.creep_rad_per_s > CREEPS:
+        tell(result, "creep", row=row, stops=first.stops)
+    if others := [each.rows[0] for each in answers[1:]]:
+        tell(
+            result, "others", rows=others, unstable=[row for row in others if row.stable_at_file_dt is False]
+        )
 
 
 def tell(result: StabilityResult, kind: str, **values: Any) -> None:
@@ -113,19 +103,20 @@ def tell_of_row(result: StabilityResult, row: StepLimitRow) -> None:
 
 def check(result: StabilityResult, row: StepLimitRow, quantity: str) -> None:
     """The check of the step, or of the period, in use at a posture."""
-    about, note = About.STEP, f"with {row.file_integrator}{', ' + row.moves_first if row.moves_first else ''}"
     if row.stable_at_file_dt is None:
         finite = "at fine steps the push is not survived either"
         why = finite if row.judged_by else "no fine run is finite"
-        result.not_judged(row.posture, quantity, why, "s", about=about)
+        result.not_judged(row.posture, quantity, why, "s", about=About.STEP)
         return
-    used = row.period_s or row.file_dt_s
-    limit = max(row.stable_up_to_s or 0.0, used) if row.stable_at_file_dt else row.stable_up_to_s or 0.0
-    result.check(row.posture, quantity, used, limit, "s", note, about=about)
+    note, up_to = (
+        f"with {row.file_integrator}{', ' * bool(row.moves_first)}{row.moves_first}",
+        row.stable_up_to_s or 0.0,
+    )
+    limit = max(up_to, row.used_s) if row.stable_at_file_dt else up_to
+    result.check(row.posture, quantity, row.used_s, limit, "s", note, about=About.STEP)
 
 
 def headline(result: StabilityResult) -> Finding | None:
     """Whether the step in use is stable, at the posture that the answer and its table are of."""
-    rows: Sequence[StepLimitRow] = result.tables["step_limits"]
-    row = next((row for row in rows if row.integrator == row.file_integrator), None)
+    row = next((row for row in result.tables["step_limits"] if row.integrator == row.file_integrator), None)
     return None if row is None or row.stable_at_file_dt is None else result.finding("headline", OF, row=row)

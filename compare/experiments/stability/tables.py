@@ -1,13 +1,15 @@
-"""The rows of the tables of stability, and its result."""
+"""The rows of the tables of stability, its result, and the methods of both engines that they are of."""
 
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
+from typing import Any, NamedTuple
 
 from ...core.check import Result
-from ...core.rows import Column, Row, column
-from ...engines import LABELS
+from ...core.rows import Row, column
+from ...engines import LABELS, Engine, Method
 
-time_step = partial(column, "s", digits=5)
+SCHEMES = ("rk4", "explicit_euler", "semi_implicit_euler", "implicit", "implicit_midpoint")  # tmt's names
+MOST_DIGITS = 5  # of a step in a report
 
 
 @dataclass(kw_only=True)
@@ -28,8 +30,8 @@ class LimitRow(OfMethod):
 
     damping: float
     mode: float = column("per_s")  # rate of the mode that limits the step
-    predicted_dt: float | None = time_step()
-    observed_dt: float | None = time_step()
+    predicted_dt: float | None = column("s", MOST_DIGITS)
+    observed_dt: float | None = column("s", MOST_DIGITS)
     limit: str  # "finite", "never_fails" or "always_fails"
     criterion: str = "no mode grows from the second to the last quarter of a run"
     passed: bool | None = None  # None: runs do not show the limit
@@ -44,18 +46,12 @@ class LimitRow(OfMethod):
 
 @dataclass(kw_only=True)
 class DepartureRow(OfMethod):
-    """When a run leaves a saddle: departure.csv. unit: of the perturbation, in the name of its column."""
+    """When a run leaves a saddle: departure.csv."""
 
-    dt: float = time_step()
-    perturbation: float
+    dt: float = column("s", MOST_DIGITS)
+    perturbation: float = column("rad")
     predicted: float | None = column("s")
     observed: float | None = column("s")
-    unit: str = "rad"
-
-    def columns(self) -> dict[str, tuple[str, Column]]:
-        named = {"perturbation": f"perturbation_{self.unit.replace(' ', '_')}"}
-        columns = super().columns()
-        return {named.get(name, name): place for name, place in columns.items() if name != "unit"}
 
 
 @dataclass(kw_only=True)
@@ -63,7 +59,7 @@ class ClaimRow(OfMethod):
     """A run of one of the assignment's three claims: stability_claims.csv."""
 
     claim: int
-    dt: float = time_step()
+    dt: float = column("s", MOST_DIGITS)
     torque: str = ""  # one of those that hold the posture
     observed: float | None = column("s")
     direction: int | None
@@ -77,5 +73,24 @@ class ClaimRow(OfMethod):
 
 @dataclass
 class StabilityResult(Result):
-    centres: tuple[str, ...] = ()  # stable postures
+    centres: tuple[str, ...] = ()  # stable postures of the arm
     schemes: dict[tuple[str, str], str] = field(default_factory=dict)  # by engine and method
+
+
+class Runs(NamedTuple):
+    """Runs that have begun, each a list of rows, and what judges the rows of all."""
+
+    rows: Iterable[list[Any]]
+    judge: Callable[[StabilityResult, list[Any]], None]
+
+
+def methods_of(engines: Mapping[str, Engine], schemes: tuple[str, ...] = ()) -> tuple[Method, ...]:
+    """The fixed-step methods of tmt and of MuJoCo; of these schemes alone, and then of MuJoCo the first of each."""
+    ours, mujoco = ([*engines[name].methods.values()] for name in ("tmt", "mujoco"))
+    first = {method.scheme: method for method in reversed(mujoco)}
+    methods = [*ours, *(method for method in mujoco if not schemes or first[method.scheme] is method)]
+    return tuple(m for m in methods if not m.adaptive and (not schemes or m.scheme in schemes))
+
+
+def rk4_of_both(engines: Mapping[str, Engine]) -> tuple[Method, ...]:
+    return methods_of(engines, ("rk4",))

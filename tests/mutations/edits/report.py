@@ -48,7 +48,7 @@ EDITS = (
     ("verdict", "verdict", "section.record.compares and _1", "True", "what agrees is said not to"),
     ("reproduce", "script", "numbers & _1", "set()", "reproduce.py does not look into results.json"),
     ("reproduce", "worst_states", "('qpos', *asked)", "('qpos',)", "reproduce.py evaluates every state at rest"),
-    ("stability.push", "Pushed.recipe", "self.push * self.signs[way]", "0.0 * self.signs[way]", "reproduce.py pushes nothing"),
+    ("stability.runs", "Runs.start", "push * self.signs[way]", "0.0 * self.signs[way]", "reproduce.py pushes nothing"),
     ("verdict", "Report.runs_file", "section.record.runs_file", "False", "all pages say what is switched off"),
     ("folder", "refuse_foreign", "name not in own", "False", "files of somebody else's are not seen"),
     ("folder", "clear_away", "if is_left:\n _1", "if True:\n _1", "the folder of a run that is alive is cleared"),
