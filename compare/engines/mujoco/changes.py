@@ -81,11 +81,6 @@ def with_iterations(model: mujoco.MjModel, count: int) -> mujoco.MjModel | None:
     )
 
 
-def with_noslip(model: mujoco.MjModel, count: int) -> mujoco.MjModel:
-    """With `count` iterations of the solver that takes slip away."""
-    return changed(model, noslip_iterations=count)
-
-
 def with_impratio(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:
     """With a factor times the ratio of frictional to normal impedance of contacts."""
     return changed(model, impratio=factor * model.opt.impratio)

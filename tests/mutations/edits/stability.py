@@ -9,7 +9,7 @@ EDITS = (
     ("stability.limits", "check_limits", "int(kind == row.limit)", "1", "a limit of another kind is as predicted"),
     ("departure", "DEPARTURE_TOLERANCE", "0.03", "3.0", "departures may be off by three seconds"),
     ("departure", "late", "0.0 if row.observed is row.predicted else None", "0.0", "a run that stays is as predicted"),
-    ("equilibrium", "Equilibrium.kind", "np.abs(self.rates).min() <= self.small", "False", "without gravity every posture is a centre"),
+    ("equilibrium", "Equilibrium.kind", "np.abs(self.rates).min() <= self.small", "False", "every posture is a centre"),
     ("equilibrium", "NEUTRAL", "1e-9", "0.1", "growth by a tenth in a step is none"),
     ("departure", "late", "row.observed - row.predicted", "0.0", "every run leaves when it should"),
     ("departure", "departure_values", "max(*_1)", "min(*_1)", "the nearest departure is the farthest"),
