@@ -1,6 +1,7 @@
 """Random MJCF on the command line: files with attributes and elements dropped, doubled and changed get status 0, 1 or 2."""
 
 import json
+from copy import deepcopy
 from xml.etree import ElementTree
 
 import pytest
@@ -16,11 +17,11 @@ FILES = {"arm": ARM.mjcf} | {name: path for name, path in PATHS.items() if "huma
 VALUES = ["", "0", "-1", "1e-9", "1e300", "nan", "inf", "true", "x", "1 0 0", "0 0 0", "0 0 0 0", "1 2", "ball", "free",
           "slide", "hinge", "alpha", "world", "1 1 1 0.9 0.9 0.9", "\u00e4\n", "RK4", "integrator", "enable"]  # fmt: skip
 TAGS = ["joint", "freejoint", "body", "inertial", "geom", "site", "default", "include", "option", "nothing"]
+HOW = ["drop attribute", "change attribute", "drop", "double", "move", "add"]
+NUMBERS = st.integers(0, 10_000)
 CHANGES = st.lists(
-    st.tuples(
-        st.sampled_from(["drop attribute", "change attribute", "drop", "double", "move", "add"]),
-        st.integers(0, 10_000), st.integers(0, 10_000), st.sampled_from(VALUES), st.sampled_from(TAGS),
-    ), min_size=1, max_size=3,
+    st.tuples(st.sampled_from(HOW), NUMBERS, NUMBERS, st.sampled_from(VALUES), st.sampled_from(TAGS)),
+    min_size=1, max_size=3,
 )  # fmt: skip
 
 
@@ -28,28 +29,22 @@ def changed(name, changes) -> str:
     """The text of a file after these changes, each to an element and an attribute by number."""
     root = ElementTree.fromstring(FILES[name].read_text(encoding="utf-8"))
     for how, at, which, value, tag in changes:
-        inside = [(parent, child) for parent in root.iter() for child in parent]
-        if not inside:
-            break
-        parent, child = inside[at % len(inside)]
-        attributes = sorted(child.attrib)
-        if how == "drop":
-            parent.remove(child)
-        elif how == "double":
-            parent.append(child)
-        elif how == "move":
-            _, other = inside[which % len(inside)]
-            if child not in other.iter() and other not in child.iter():
-                parent.remove(child)
-                other.append(child)
+        inside = [(parent, child) for parent in root.iter() for child in parent] or [(root, root)]
+        (parent, child), (_, other) = inside[at % len(inside)], inside[which % len(inside)]
+        key = sorted(child.attrib)[which % len(child.attrib)] if child.attrib else "name"
+        is_loop = child in other.iter() or other in child.iter()
+        if how == "drop attribute":
+            child.attrib.pop(key, None)
+        elif how == "change attribute":
+            child.set(key, value)
         elif how == "add":
             child.append(ElementTree.Element(tag, {"name": value} if value else {}))
-        elif attributes:
-            key = attributes[which % len(attributes)]
-            if how == "drop attribute":
-                del child.attrib[key]
-            else:
-                child.attrib[key] = value
+        elif how == "double":
+            parent.append(deepcopy(child))
+        elif child is not root and (how == "drop" or not is_loop):
+            parent.remove(child)
+            if how == "move":
+                other.append(child)
     return ElementTree.tostring(root, encoding="unicode")
 
 
