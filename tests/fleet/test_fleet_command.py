@@ -13,7 +13,8 @@ from helpers.toy import soon
 
 from compare.__main__ import main
 from compare.core.errors import Refused
-from compare.fleet.table import FLEET_COLUMNS, FileRow
+from compare.experiments import EXPERIMENTS, TIMED
+from compare.fleet.table import FLEET_COLUMNS
 
 NAME = "a b#ü.xml" if sys.getfilesystemencoding() == "utf-8" else "a b#u.xml"  # of a file that agrees
 MODELS = runs.ROOT / "tests" / "models"
@@ -63,22 +64,6 @@ def test_a_file_has_the_report_that_it_has_alone(folder):
     assert {path.name for path in one.iterdir()} <= {path.name for path in many.iterdir()}
 
 
-def test_the_status_is_1_where_a_file_differs(folder, monkeypatch):
-    said, words = [], ["fleet", "m/x", "--only", "mass", "--out", "out", "--workers", "1"]
-
-    def carried_out(self):
-        (model,) = self.models
-        self.rows.append(FileRow(file=model.shown, verdict=said[-1], reason="no reason"))
-        return self.rows
-
-    monkeypatch.setattr("compare.fleet.run.Run.carried_out", carried_out)
-    statuses = {"agree": 0, "self-consistent": 0, "refused": 0, "unconfirmed": 1, "broke": 1, "differ": 1}
-    statuses |= {"engine differs": 1, "not judged": 1}
-    for verdict, status in statuses.items():
-        said.append(verdict)
-        assert main(words) == status
-
-
 @pytest.mark.parametrize("arguments, word", [
     ("--onyl=mass", "did you mean --only?"), ("--reference my.py:", "FILE.xml"), ("--limit nan", "--limit: 'nan'"),
     ("--only speed", "measures times"), ("--dask x --workers 2", "--workers"), ("--timing", "--timing"),
@@ -91,16 +76,18 @@ def test_what_cannot_be_carried_out_gets_status_2_and_one_line(arguments, word, 
     assert not (folder / "reports").exists()
 
 
-@pytest.mark.parametrize("words, asked", [
-    ("--workers 3 --limit 7", ("Pool", 3, 7.0, True)),
-    ("--dask tcp://x:1 --full", ("Cluster", "tcp://x:1", 1800.0, False)),
+@pytest.mark.parametrize("words, asked, left_out", [
+    ("--workers 3 --limit 7 --reference model", ("Pool", 3, 7.0, True), ()),
+    ("--dask tcp://x:1 --full --reference arm", ("Cluster", "tcp://x:1", 1800.0, False), ()),
+    # what asks about one file is for full runs if there is a reference
+    ("--workers 1 --reference arm", ("Pool", 1, 1800.0, True), ("engines", "stability", "reduction")),
+    ("--workers 1 --only gravity,mass", ("Pool", 1, 1800.0, True), {*EXPERIMENTS} - {"gravity", "mass"}),
 ])  # fmt: skip
-def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, capsys):
+def test_what_is_asked_for_is_what_is_run(words, asked, left_out, folder, monkeypatch, capsys):
     seen = []
 
     def run(models, given, *_):
-        seen.append(given.is_quick)
-        assert given.names == ("mass", "gravity")
+        seen.extend((given.is_quick, given.names))
         raise Refused("seen")
 
     for name in ("Pool", "Cluster"):
@@ -108,27 +95,9 @@ def test_what_is_asked_for_is_what_is_run(words, asked, folder, monkeypatch, cap
         made = {"__init__": start, "close": lambda self: None}
         monkeypatch.setattr(f"compare.fleet.executors.{name}", type(name, (), made))
     monkeypatch.setattr("compare.fleet.run.Run", run)
-    assert main(["fleet", "m", "--only", "gravity,mass", "--out", "asked", *words.split()]) == 2
-    assert tuple(seen) == asked and "seen" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("words, has_rest", [
-    ("", True), ("--reference model", True), ("--reference arm", False), ("--reference arm --full", True),
-])  # fmt: skip
-def test_with_a_reference_what_asks_about_one_file_is_for_full_runs(words, has_rest, monkeypatch, folder):
-    """Without one there is nothing else; what compares two models is always there, and what measures times never."""
-    seen = []
-
-    def run(models, given, *_):
-        seen.extend(given.names)
-        raise Refused("seen")
-
-    monkeypatch.setattr("compare.fleet.run.Run", run)
     assert main(["fleet", "m", "--out", "asked", *words.split()]) == 2
-    assert {"parameters", "mass", "trajectory", "diagnosis"} <= {*seen} and not {"speed", "derivatives"} & {
-        *seen
-    }
-    assert [name in seen for name in ("stability", "reduction")] == [has_rest] * 2
+    names = tuple(name for name in EXPERIMENTS if name not in (*TIMED, *left_out))
+    assert tuple(seen) == (*asked, names) and "seen" in capsys.readouterr().err
 
 
 # ended in the middle: a line, nothing left behind, and the same command goes on from there

@@ -66,6 +66,7 @@ def judged(*checks, limits=(), causes=(), reference="arm"):
 def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, named):
     row = judged(*checks, **more)
     assert row.verdict == verdict and named in row.reason and bool(named) == bool(row.reason)
+    assert row.is_bad is (verdict not in (AGREE, ITSELF, REFUSED))  # the exit status
 
 
 def limit(dt, stable, integrator="Euler"):
