@@ -22,7 +22,7 @@ PINK, SKY = "#CC79A7", "#56B4E9"
 # of joints
 DASHES: tuple[Any, ...] = "-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1))
 LINES = tuple(zip((BLUE, RED, GREEN, ORANGE, PINK, SKY), DASHES))
-DPI = 150
+DPI = 110
 WIDTH = 7.5  # inches, a page
 NUMBER = re.compile(r"\$(\\mathdefault\{)?[-0-9.^{}]*(\\times10)?[-0-9.^{}]*\$")  # of an axis, as a formula
 matplotlib.rc("font", size=9)

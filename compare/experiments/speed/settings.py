@@ -21,7 +21,7 @@ FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
 # seconds of the finest run of a method; of a method whose coarsest run takes longer there is none; and after which
 # a method of a called engine has no finer run
-MOST_SECONDS, SLOWEST_RUN, LONGEST_CALLED = {"full": 0.3, "quick": 0.1, "small": 0.1}, 0.6, 0.06
+MOST_SECONDS, SLOWEST_RUN, LONGEST_CALLED = {"full": 0.15, "quick": 0.1, "small": 0.1}, 0.6, 0.06
 # A robot may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5; an engine
 # that is called from Python adds those of a call and of the solver's own work:
 SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
