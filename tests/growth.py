@@ -1,7 +1,6 @@
-"""How cost grows with the number of joints: python cost_over_size.py 3 10 30 100 300.
+"""How cost grows with the number of joints: `python -m tests.growth 3 10 30 100 300` writes reports/growth.
 
 Of chains of hinges: processor time and memory of `all --quick`, the time of one mass matrix, the size of exported C.
-It writes costs.csv and costs.png.
 """
 
 import json
@@ -12,17 +11,16 @@ import tempfile
 import time
 from pathlib import Path
 
-import matplotlib
 import mujoco
 import numpy as np
 import pandas
 import psutil
+from matplotlib.figure import Figure
 
 import compare
 import tmt
 
-matplotlib.use("agg")
-LONGEST = 1800  # s of `all --quick`
+FOLDER = Path(__file__).parents[1] / "reports" / "growth"
 FEW = 100  # joints up to which C is exported
 AXES = "1 0 0", "0 1 0", "0 0 1"
 
@@ -51,7 +49,11 @@ def cost_of_a_run(path: Path, folder: str) -> dict[str, float]:
     used = os.times()
     checks = json.loads(Path(folder, "out", "results.json").read_text())["checks"]
     print(f"{path.stem}: {len(checks)} checks, {sum(not check['passed'] for check in checks)} fail")
-    return {"wall_s": time.monotonic() - begin, "MB": most / 1e6, "children_s": used.children_user + used.children_system}
+    return {
+        "wall_s": time.monotonic() - begin,
+        "MB": most / 1e6,
+        "children_s": used.children_user + used.children_system,
+    }
 
 
 def seconds(call, least=0.2) -> float:
@@ -80,7 +82,12 @@ def costs(joints: int, folder: str) -> dict[str, float]:
     before = os.times()
     run = cost_of_a_run(path, folder)
     before_s = before.children_user + before.children_system
-    row = {"joints": joints, "run_processor_s": run["children_s"] - before_s, "run_wall_s": run["wall_s"], "run_MB": run["MB"]}
+    row = {
+        "joints": joints,
+        "run_processor_s": run["children_s"] - before_s,
+        "run_wall_s": run["wall_s"],
+        "run_MB": run["MB"],
+    }
     model = mujoco.MjModel.from_xml_path(str(path))
     data, tree, M = mujoco.MjData(model), compare.tree(path), np.zeros((joints, joints))
     q = data.qpos[:] = np.random.default_rng(1).uniform(-3, 3, joints)
@@ -105,14 +112,15 @@ def costs(joints: int, folder: str) -> dict[str, float]:
     return row
 
 
-def draw(table: pandas.DataFrame) -> None:
-    from matplotlib.figure import Figure
-
+def draw(table: pandas.DataFrame, path: Path) -> None:
     figure = Figure((7.5, 3.4), layout="constrained")
     shown = {
         "all --quick, processor time, s": {"run_processor_s": "whole run", "c_s": "three quantities as C"},
         "one mass matrix, us": {"M_mujoco_us": "MuJoCo", "M_tmt_us": "TMT, compiled"},
-        "memory, MB, and C, kB": {"run_MB": "memory of the run, MB", "c_kB": "M, h and accelerations as C, kB"},
+        "memory, MB, and C, kB": {
+            "run_MB": "memory of the run, MB",
+            "c_kB": "M, h and accelerations as C, kB",
+        },
     }
     for ax, (title, columns) in zip(figure.subplots(1, 3), shown.items()):
         for (column, label), marker, colour in zip(columns.items(), "os", ("#0072B2", "#E69F00")):
@@ -120,16 +128,22 @@ def draw(table: pandas.DataFrame) -> None:
         ax.set(xlabel="joints of the chain", title=title)
         ax.grid(alpha=0.3)
         ax.legend(frameon=False, fontsize=8)
-    figure.savefig("costs.png", dpi=110)
+    figure.savefig(path, dpi=110)
 
 
-if __name__ == "__main__":
+def main(sizes: list[int], out: Path) -> None:
+    """Write the table and the chart of chains of these numbers of joints."""
+    out.mkdir(exist_ok=True)
     rows = []
-    for joints in map(int, sys.argv[1:]):
+    for joints in sizes:
         with tempfile.TemporaryDirectory() as folder:
             os.environ["TMT_CACHE"] = f"{folder}/store"
             rows.append(costs(joints, folder))
         table = pandas.DataFrame(rows)
-        table.to_csv("costs.csv", index=False, float_format="%.4g")
+        table.to_csv(out / "costs.csv", index=False, float_format="%.4g")
     print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
-    draw(table)
+    draw(table, out / "costs.png")
+
+
+if __name__ == "__main__":
+    main([int(size) for size in sys.argv[1:]], FOLDER)
