@@ -8,6 +8,8 @@ level of its own, and a number of another level is a constant to it.
 from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 
+import numpy as np
+
 from .vectors import Rows, Scalar, Scalars, Values, cos, sign, sin, sqrt
 
 levels = count()
@@ -82,14 +84,25 @@ def seeded(values: Iterable[Scalar], slopes: Iterable[Scalar]) -> list[Dual]:
 
 
 def jacobian(
-    function: Callable[[Values], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = ()
-) -> Rows:
-    """d function_i / d x_j (rows i, columns j); directions: in place of each x_j alone."""
-    columns = []
-    for direction in directions or unit_vectors(len(x)):
-        nudged = seeded(x, direction)
-        columns.append([nudged[0].parts(result)[1] for result in function(nudged)])
-    return [list(row) for row in zip(*columns)]
+    function: Callable[[Values], Iterable[Scalar]], x: Scalars, directions: Sequence[Scalars] = (),
+    at_once: bool = False,
+) -> Rows:  # fmt: skip
+    """d function_i / d x_j (rows i, columns j); directions: in place of each x_j alone.
+
+    at_once: all directions in one array, of an x of floats and arrays.
+    """
+    directions = directions or unit_vectors(len(x))
+    if not at_once:
+        columns = []
+        for direction in directions:
+            nudged = seeded(x, direction)
+            columns.append([nudged[0].parts(result)[1] for result in function(nudged)])
+        return [list(row) for row in zip(*columns)]
+    batch = np.broadcast_shapes(*map(np.shape, x))
+    nudged = seeded(x, [np.stack([np.broadcast_to(d, batch) for d in part]) for part in zip(*directions)])
+    shape = len(directions), *batch
+    slopes = [nudged[0].parts(result)[1] for result in function(nudged)]
+    return [list(np.broadcast_to(slope, shape)) for slope in slopes]
 
 
 def values_of(numbers: Values) -> Values:

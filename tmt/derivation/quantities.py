@@ -7,8 +7,10 @@ from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from . import method, whole
-from .dual import jacobian, unit_vectors
+from .dual import jacobian, unit_vectors, values_of
 from .form import LITERAL, Form, Rates
 from .mechanism import Mechanism
 from .vectors import ZERO, Factors, Rows, Scalar, Scalars, Values, added
@@ -32,6 +34,7 @@ class State:
         self.tree, self.q, self.moves = tree, given["q"], "qd" in given
         self.qd, self.tau = given.get("qd", nothing), given.get("tau", nothing)
         self.form, self.name, self.step, self.given = form, name, step, given
+        self.at_once = all(isinstance(x, float | np.ndarray) for x in (*self.q, *self.qd))
 
     @cached_property
     def bodies(self) -> list[method.Body]:
@@ -80,7 +83,8 @@ class State:
         """Derivatives of Mbar qdd + h by tangent vectors of q and by qd, (nv, nv) each."""
         if self.form.rates is None:
             by_tangent = self.by_tangent(lambda q: self.force(q, self.qd))
-            return by_tangent, jacobian(lambda qd: self.force(self.q, qd), list(self.qd))
+            by_speed = jacobian(lambda qd: self.force(self.q, qd), list(self.qd), at_once=self.at_once)
+            return by_tangent, by_speed
         return self.form.rates(self.tree, self.q, self.qd, self.qdd)
 
     @cached_property
@@ -95,7 +99,7 @@ class State:
 
     def by_tangent(self, function: Callable[[Values], Values]) -> Rows:
         moved = [self.tree.coordinates.component_rates(self.q, u) for u in unit_vectors(len(self.qd))]
-        return jacobian(function, list(self.q), moved)
+        return jacobian(function, list(self.q), moved, self.at_once)
 
     @property
     def derivatives(self) -> list[Rows]:
@@ -120,21 +124,24 @@ class State:
     def frame(self) -> method.Placed:
         return method.placed_frame(self.tree, self.name, self.q, self.qd if self.moves else None)
 
-    @property
-    def step_derivatives(self) -> Rows:
+    def step_derivatives(self, by_torque: bool = True) -> Rows:
         """[A B], (2 nv, 3 nv): the state after a step by that before it (tangent, qd) and by the torque."""
         assert self.step is not None
         step, coordinates, dt = self.step, self.tree.coordinates, self.given["dt"][0]
-        nq, n, nothing = len(self.q), len(self.qd), [0.0] * len(self.q)
-        directions = [[*coordinates.component_rates(self.q, u), *[0.0] * (2 * n)] for u in unit_vectors(n)]
-        directions += [[*nothing, *u] for u in unit_vectors(2 * n)]
-        q, _ = step(list(self.q), list(self.qd), list(self.tau), dt)
+        nq, n, x = len(self.q), len(self.qd), [*self.q, *self.qd, *self.tau]
+        others = n + n * by_torque  # that are differentiated by, beside the position
+        directions = [[*coordinates.component_rates(self.q, u), *[0.0] * others] for u in unit_vectors(n)]
+        directions += [[*[0.0] * nq, *u] for u in unit_vectors(others)]
+        reached: Values = []
 
-        def after(x: Values) -> Values:
-            return [value for part in step(x[:nq], x[nq : nq + n], x[nq + n :], dt) for value in part]
+        def after(some: Values) -> Values:
+            y = [*some, *x[len(some) :]]
+            new_q, new_qd = step(y[:nq], y[nq : nq + n], y[nq + n :], dt)
+            reached[:] = values_of(new_q)
+            return [*new_q, *new_qd]
 
-        columns = zip(*jacobian(after, [*self.q, *self.qd, *self.tau], directions))
-        moved = [[*coordinates.tangent(q, list(column[:nq])), *column[nq:]] for column in columns]
+        columns = zip(*jacobian(after, x[: nq + others], directions, self.at_once))
+        moved = [[*coordinates.tangent(reached, list(column[:nq])), *column[nq:]] for column in columns]
         return [list(row) for row in zip(*moved)]
 
 
@@ -208,7 +215,7 @@ QUANTITIES = {
         title="Accelerations of a frame at qdd = 0, of its origin and angular, inertial frame, shape (6,).",
     ),
     "step_derivatives": Quantity(
-        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives, argument="method", is_long=True, solves=True,
+        (*TAU, "dt"), ("2nv", "3nv"), "SI", lambda s: s.step_derivatives(), argument="method", is_long=True, solves=True,
         title="[A B] (2 nv, 3 nv) of one step, A = dx+/dx beside B = dx+/dtau, x = (tangent, qd), dt in s.",
     ),
 }  # fmt: skip

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tmt.derivation.dual import Dual, seeded, values_of
+from tmt.derivation.dual import Dual, values_of
 from tmt.derivation.form import COMPOSITE, LITERAL, Form, Implicit
 from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.quantities import State
@@ -100,9 +100,8 @@ class Linearized(Form):
 
 
 def one_step(
-    stepping: Method, tree: Mechanism, q: Values, qd: Values, tau: Values, dt: Scalar,
-    form: Form = LITERAL,
-) -> Reached:  # fmt: skip
+    stepping: Method, tree: Mechanism, q: Values, qd: Values, tau: Values, dt: Scalar, form: Form = LITERAL
+) -> Reached:
     """The state (q, qd) of a tree one dt later by a method, over any scalar."""
 
     def slope(q: Values, qd: Values) -> Values:
@@ -129,37 +128,18 @@ def transition(
 ) -> Array:  # fmt: skip
     """The same by q, qd and tau (..., nv): (..., 2 nv, 3 nv) or, not by_torque, (..., 2 nv, 2 nv)."""
     nv = tree.coordinates.nv
-    width = (2 + by_torque) * nv
     batch = np.broadcast_shapes(*(np.shape(x)[:-1] for x in (q, qd, tau)), np.shape(dt))
-    q, qd, tau = (
-        np.broadcast_to(x, (*batch, np.shape(x)[-1])).reshape(-1, np.shape(x)[-1]) for x in (q, qd, tau)
-    )
-    steps, size = np.broadcast_to(dt, batch).reshape(-1), max(1, PART // nv)
-    jacobians = [np.empty((0, 2 * nv, width))]
-    for k in range(0, len(steps), size):
-        part = slice(k, k + size)
-        states = q[part], qd[part], tau[part]
-        jacobians.append(jacobian_of_part(stepping, tree, *states, steps[part], width))
-    return np.concatenate(jacobians).reshape(*batch, 2 * nv, width)
-
-
-def jacobian_of_part(
-    stepping: Method, tree: Mechanism, q: Array, qd: Array, tau: Array, dt: Array, width: int
-) -> Array:
-    """The same of a few states: q (states, nq), qd, tau (states, nv), dt (states,); width: of columns."""
-    joints, nv, nq = tree.coordinates, qd.shape[1], q.shape[1]
-    start = [*q.T.copy(), *qd.T.copy(), *tau.T.copy()]
-    directions = np.eye(width)[..., None]  # component, direction, state
-    moved = [*joints.component_rates(start[:nq], directions[:nv]), *directions[nv:]]
-    state = [*seeded(start[: len(moved)], moved), *start[len(moved) :]]
+    arrays = [np.broadcast_to(x, (*batch, np.shape(x)[-1])) for x in (q, qd, tau, np.expand_dims(dt, -1))]
+    states, size = [x.reshape(-1, x.shape[-1]) for x in arrays], max(1, PART // nv)
     # the Jacobian of stages that are solved for is by dual numbers of dual numbers
-    through_solution = nv <= FEW_SPEEDS or stepping.solves_stages
-    form = COMPOSITE if through_solution else Linearized()
-    torque = state[nq + nv :]
-    new_q, new_qd = one_step(stepping, tree, state[:nq], state[nq : nq + nv], torque, dt, form)
-    moved = joints.tangent([x.value for x in new_q], [x.slope for x in new_q])
-    slopes = [np.broadcast_to(slope, (width, len(dt))) for slope in (*moved, *(x.slope for x in new_qd))]
-    return np.array(slopes).transpose(2, 0, 1)
+    form = COMPOSITE if nv <= FEW_SPEEDS or stepping.solves_stages else Linearized()
+    step, jacobians = partial(one_step, stepping, tree, form=form), []
+    for k in range(0, max(1, len(states[0])), size):
+        part = [list(x[k : k + size].T.copy()) for x in states]
+        state = State(tree, dict(zip(("q", "qd", "tau", "dt"), part)), step=step)
+        rows = [np.broadcast_arrays(*row) for row in state.step_derivatives(by_torque)]
+        jacobians.append(np.array(rows).transpose(2, 0, 1))
+    return np.concatenate(jacobians).reshape(*batch, 2 * nv, (2 + by_torque) * nv)
 
 
 def times(matrix: Rows, values: Values) -> Values:

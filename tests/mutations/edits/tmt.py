@@ -69,7 +69,7 @@ EDITS = (
     ("simulation", "in_blocks", "reasons(runner.tree, block_q, block_qd, codes, dt, tolerance, first)",
      "reasons(runner.tree, block_q, block_qd, codes, dt, tolerance)", "times begin anew with each block"),
     ("derivatives", "Linearized.changes_of_bias", "[0.5] * len(qd)", "[1.0] * len(qd)", "an implicit bias changes twice as much"),
-    ("derivatives", "jacobian_of_part", "joints.tangent(_1, _2)", "list(_2)", "quaternions have four derivatives"),
+    ("quantities", "State.step_derivatives", "coordinates.tangent(reached, _1)", "_1[:-1]", "quaternions have other derivatives"),
     ("derivation.linearized", "rates", "frames[before].a - v0.angular.cross(v0.linear)",
      "frames[before].a", "the frame before accelerates with a point that moves"),
     ("dual", "Dual.outranked", "other.level > self.level", "False", "derivatives in a derivative mix"),
