@@ -172,19 +172,13 @@ def reasons(
     }
     for run, (code, step) in enumerate(codes.tolist()):
         why = words.get(code)
-        if place := singular_in(tree, q[run], qd[run]):
-            step, why = place
-            q[run, step + 1 :] = qd[run, step + 1 :] = np.nan
+        if not tree.never_singular:  # the first and the last state, and that before the largest change
+            alive = int(np.isfinite(q[run, :, 0]).sum())
+            change = np.abs(np.diff(qd[run, :alive], axis=0)).max(axis=1, initial=0.0)
+            records = np.unique([0, alive - 1, int(np.argmax([*change, -1.0]))])
+            if place := singular.first(tree, q[run, records]):
+                step, why = int(records[place[0]]), f"Mbar is singular: {place[1]}"
+                q[run, step + 1 :] = qd[run, step + 1 :] = np.nan
         if why:
             ended[run] = f"at t = {(first + step) * dt:g} s: {why}"
     return ended
-
-
-def singular_in(tree: Tree, q: Array, qd: Array) -> tuple[int, str] | None:
-    if tree.never_singular:
-        return None
-    alive = int(np.isfinite(q[:, 0]).sum())
-    change = np.abs(np.diff(qd[:alive], axis=0)).max(axis=1)
-    records = np.unique([0, alive - 1, int(np.argmax(change)) if len(change) else 0])
-    place = singular.first(tree, q[records])
-    return (int(records[place[0]]), f"Mbar is singular: {place[1]}") if place else None

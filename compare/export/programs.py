@@ -68,7 +68,7 @@ class Program(ABC):
 
     def operations(self, quantity: str) -> int:
         """+ - * / of an evaluation; a sine, a cosine, a root count as one each."""
-        return traced_of(self.tree, quantity, self.chosen).operations
+        return traced_of(self.tree, quantity, self.chosen.words if self.chosen else ()).operations
 
     def run(self, *command: str) -> None:
         try:

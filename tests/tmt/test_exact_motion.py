@@ -17,7 +17,7 @@ from tmt.exact import motion as reference_run
 from tmt.exact.motion import trajectory, truth
 from tmt.exact.tree import exact_tree, of_length_1
 from tmt.methods import METHODS, one_step
-from tmt.simulation import reasons, singular_in
+from tmt.simulation import reasons
 
 DIGITS = 32
 
@@ -138,20 +138,18 @@ def test_where_newton_fails_one_step_is_an_error():
         one_step(METHODS["implicit_midpoint"], tmt.ARM, BENT.tolist(), [1e6] * 3, [0.0] * 3, 10.0)
 
 
-def test_a_singular_state_before_the_rates_jump_is_found():
-    q, qd = np.zeros((1, 9, 3)), np.zeros((1, 9, 3))
-    q[0, :, 1] = [1.0, 0.8, 0.6, 0.4, 0.0, -0.4, -0.6, -0.8, -1.0]
-    qd[0, 5:] = 1.0
+@pytest.mark.parametrize("beta, where", [
+    ([1.0, 0.8, 0.6, 0.4, 0.0, -0.4, -0.6, -0.8, -1.0], 4), ([1.0, 0.5, 0.0], 2), ([1.0, 0.5], None),
+])  # fmt: skip
+def test_a_singular_state_before_the_rates_jump_is_found_and_so_is_the_last(beta, where):
+    q, qd = np.zeros((2, 1, len(beta), 3))
+    q[0, :, 1], qd[0, (len(beta) + 1) // 2 :] = beta, 1.0
     (why,) = reasons(wrist(), q, qd, np.zeros((1, 2), int), 0.1, 1e-9)
-    assert why.startswith("at t = 0.4 s: ") and "'a', 'c'" in why
-    assert np.isfinite(q[0, :, 0]).tolist() == [True] * 5 + [False] * 4
-
-
-def test_the_last_state_of_a_run_is_looked_at():
-    """The rates change most at the start, and the last state is the one at which Mbar is singular."""
-    q, qd = np.array([[0.5, 1.0, 1.0], [0.5, 0.5, 1.0], [0.5, 0.0, 1.0]]), np.zeros((3, 3))
-    qd[1:] = 1.0
-    assert singular_in(wrist(), q, qd)[0] == 2 and singular_in(wrist(), q[:2], qd[:2]) is None
+    if where is None:
+        assert why is None
+    else:
+        assert why.startswith(f"at t = {0.1 * where:g} s: ") and "'a', 'c'" in why
+        assert np.isfinite(q[0, :, 0]).tolist() == [k <= where for k in range(len(beta))]
 
 
 def test_a_motion_is_three_arrays_and_more():

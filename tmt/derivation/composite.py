@@ -23,7 +23,7 @@ import mpmath
 from .coordinates import Joint
 from .mechanism import Mechanism, origin_in_parent, rotation_in_parent
 from .method import with_diagonal, with_rotors
-from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, combined, outer, total_vector
+from .vectors import ZERO, Matrix, Rows, Scalar, Scalars, Values, Vector, combined, outer
 
 Placement = tuple[Vector, Matrix]  # origin (m) and turn of a frame in its parent's
 Round = Callable[..., Scalar]  # float or mpmath.mpf, to which what is exact is rounded once
@@ -146,7 +146,7 @@ class Motion(NamedTuple):
 
 
 def along_axes(tree: Mechanism, joint: Joint, rates: Scalars) -> Vector:
-    return total_vector(Vector(*axis) * rate for axis, rate in zip(tree.axis[joint.qd], rates[joint.qd]))
+    return sum((Vector(*axis) * rate for axis, rate in zip(tree.axis[joint.qd], rates[joint.qd])), ZERO)
 
 
 def motions(tree: Mechanism, placements: list[Placement], qd: Scalars, qdd: Scalars = ()) -> list[Motion]:

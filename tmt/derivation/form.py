@@ -52,7 +52,7 @@ class Form:
         M, h = self.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
         if implicit is None:
-            return vectors.solve(M, force)
+            return vectors.Factors(M).solve(force)
         matrix = added(M, implicit.matrix)
         if implicit.bias_rows:
             rates = self.bias_rates(tree, q, qd)

@@ -28,6 +28,7 @@ from .mechanism import Mechanism, origin_in_parent, rotation_in_parent
 from .vectors import (
     IDENTITY,
     ZERO,
+    Factors,
     Matrix,
     Rows,
     Scalar,
@@ -36,9 +37,7 @@ from .vectors import (
     Vector,
     minus,
     plus,
-    solve,
     total,
-    total_vector,
     weighted,
 )
 
@@ -73,14 +72,6 @@ class Body(NamedTuple):
     rotation: Matrix  # body axes -> inertial axes
 
 
-class Placed(NamedTuple):
-    """A frame that a joint carries: nested lists of scalars, in the inertial frame."""
-
-    pose: Rows  # (3, 4): the axes of the frame as columns, and its origin, m
-    jacobian: Rows  # (6, nv): velocity of the origin, m/s, and angular velocity, rad/s, for unit speeds
-    convective: Values  # (6,): d(J qd)/dq qd, m/s2 and rad/s2
-
-
 WORLD = Frame(ZERO, IDENTITY, [], False, ZERO, ZERO, ZERO)
 
 
@@ -105,7 +96,7 @@ def joint_frames(tree: Mechanism, q: Scalars, qd: Scalars | None = None, qdd: Sc
         rotation = parent.rotation @ rotation_in_parent(tree, i, q)
         carrier = rotation if joint.kind == "ball" else parent.rotation  # the axes of a ball turn with it
         axes = [carrier @ axis for axis in axes]
-        spin = total_vector(axis * rate for axis, rate in zip(axes, qd[joint.qd]))
+        spin = sum((axis * rate for axis, rate in zip(axes, qd[joint.qd])), ZERO)
         omega, omega_conv = parent.omega + spin, parent.omega_conv + parent.omega.cross(spin)
         omega_conv = sum((axis * rate for axis, rate in zip(axes, qdd[joint.qd])), omega_conv)
         frames.append(Frame(origin, rotation, axes, False, omega, origin_conv, omega_conv))
@@ -148,8 +139,14 @@ def columns(
     return result
 
 
-def placed_frame(tree: Mechanism, name: str, q: Scalars, qd: Scalars | None = None) -> Placed:
-    """The site or body of that name of a tree; of a body the frame of its joint."""
+def placed_frame(
+    tree: Mechanism, name: str, q: Scalars, qd: Scalars | None = None
+) -> tuple[Rows, Rows, Values]:
+    """A site of a tree, or the frame of the joint of a body, in the inertial frame.
+
+    pose (3, 4): its axes as columns, and its origin, m; jacobian (6, nv): velocity of the origin, m/s, and
+    angular velocity, rad/s, for unit speeds; convective (6,): d(J qd)/dq qd, m/s2 and rad/s2.
+    """
     frames, site = joint_frames(tree, q, qd), tree.site_of(name)
     carrier = frames[site.joint] if site.joint >= 0 else WORLD
     x, x_conv = carried(carrier, Vector(*site.offset))
@@ -157,7 +154,7 @@ def placed_frame(tree: Mechanism, name: str, q: Scalars, qd: Scalars | None = No
     moving = columns(tree, frames, site.joint, x, IDENTITY)
     jacobian = [list(row) for row in zip(*([*linear, *angular] for linear, angular in moving))]
     pose = [[*row, component] for row, component in zip(rotation, x)]
-    return Placed(pose, jacobian, [*x_conv, *carrier.omega_conv])
+    return pose, jacobian, [*x_conv, *carrier.omega_conv]
 
 
 def mass_matrix(parts: Sequence[Body], armature: Scalars = ()) -> Rows:
@@ -253,7 +250,7 @@ def acceleration(
 ) -> Values:
     """qdd (nv, rad/s2) from Mbar qdd = Qbar, see the head of this file."""
     M, h = terms(tree, q, qd)
-    return solve(M, reduced_force(tree, h, q, qd, tau))
+    return Factors(M).solve(reduced_force(tree, h, q, qd, tau))
 
 
 def potential(parts: Sequence[Body], gravity: Iterable[Scalar]) -> Scalar:

@@ -121,7 +121,7 @@ class State:
         return self.potential_energy + method.kinetic(self.bodies, self.qd, self.tree.armature)
 
     @cached_property
-    def frame(self) -> method.Placed:
+    def frame(self) -> tuple[Rows, Rows, Values]:
         return method.placed_frame(self.tree, self.name, self.q, self.qd if self.moves else None)
 
     def step_derivatives(self, by_torque: bool = True) -> Rows:
@@ -203,15 +203,15 @@ QUANTITIES = {
     "potential_energy": Quantity(Q, (), "J", lambda s: s.potential_energy, has_forms=False),
     "energy": Quantity(QD, (), "J", lambda s: s.energy, has_forms=False),
     "frame_pose": Quantity(
-        Q, (3, 4), "1; m", lambda s: s.frame.pose, argument="frame", has_forms=False,
+        Q, (3, 4), "1; m", lambda s: s.frame[0], argument="frame", has_forms=False,
         title="Axes of a frame as columns and its origin, m, inertial frame, shape (3, 4).",
     ),
     "frame_jacobian": Quantity(
-        Q, (6, "nv"), "m/rad; 1", lambda s: s.frame.jacobian, argument="frame", has_forms=False,
+        Q, (6, "nv"), "m/rad; 1", lambda s: s.frame[1], argument="frame", has_forms=False,
         title="Velocity of a frame's origin and angular one, for unit speeds, inertial frame, shape (6, nv).",
     ),
     "frame_convective": Quantity(
-        QD, (6,), "m/s2; rad/s2", lambda s: s.frame.convective, argument="frame", has_forms=False,
+        QD, (6,), "m/s2; rad/s2", lambda s: s.frame[2], argument="frame", has_forms=False,
         title="Accelerations of a frame at qdd = 0, of its origin and angular, inertial frame, shape (6,).",
     ),
     "step_derivatives": Quantity(

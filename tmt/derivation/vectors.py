@@ -167,11 +167,6 @@ class Factors:
         return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
 
 
-def solve(matrix: Sequence[Scalars], right: Scalars) -> Values:
-    """Solution x of `matrix` x = `right`, for a symmetric positive definite matrix given by rows."""
-    return Factors(matrix).solve(right)
-
-
 def solve_any(matrix: Sequence[Scalars], right: Scalars) -> Values:
     """Solution x of `matrix` x = `right`, any by rows, by L U without pivots, as MuJoCo's implicit has it."""
     n = len(right)
@@ -216,8 +211,3 @@ def minus(first: Scalars, second: Scalars) -> Values:
 
 def added(first: Sequence[Scalars], second: Sequence[Scalars]) -> Rows:
     return [plus(*rows) for rows in zip(first, second)]
-
-
-def total_vector(vectors: Iterable[Vector]) -> Vector:
-    first, *more = vectors
-    return sum(more, first)

@@ -166,7 +166,7 @@ def function_of(model: Tree, name: str, parameters: Parameters) -> Function:
     sizes |= {x: len(value) for x, value in parameters.values.items()}
     title = quantity.title or f"{getattr(tmt, name).__doc__.splitlines()[0]} Unit: {quantity.unit}."
     results, shape = (quantity.parts, shape[1:]) if quantity.parts else (("out",), shape)
-    takes, operations = (*quantity.takes, *parameters.values), traced(model, name, parameters)
+    takes, operations = (*quantity.takes, *parameters.values), traced(model, name, parameters.words)
     return Function(identifier(name), title, takes, sizes, shape, results, operations)
 
 
@@ -175,11 +175,11 @@ def identifier(name: str) -> str:
 
 
 @lru_cache(maxsize=16)
-def traced(model: Tree, name: str, parameters: Parameters | None) -> Traced:
-    if parameters is None:
-        return forms.quantity(model, name)
+def traced(model: Tree, name: str, words: tuple[str, ...] = ()) -> Traced:
+    parameters = Parameters(model, words)
 
     def tree_of(arrays: Sequence[Values]) -> Mechanism:
         return parameters.applied(model, dict(zip(parameters.values, arrays)))
 
-    return forms.quantity(model, name, [len(value) for value in parameters.values.values()], tree_of)
+    sizes = [len(value) for value in parameters.values.values()]
+    return forms.quantity(model, name, sizes, tree_of if sizes else None)

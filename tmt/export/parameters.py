@@ -45,7 +45,7 @@ class Parameters:
         axes = zip(tree.site_offset, tree.site_rotation)
         # a site of a body's name on another joint is no frame of the body
         self.sites = {name: own for (name, joint), own in zip(sites, axes) if carrier.get(name) == joint}
-        self.carriers, self.key = list(range(len(tree.mass))), (tree, *words)
+        self.carriers, self.words = list(range(len(tree.mass))), tuple(words)
         self.has_payload, remaining = False, list(words)
         while remaining:
             word = remaining.pop(0)
@@ -61,12 +61,6 @@ class Parameters:
             else:
                 expected = f"gravity, payload,BODY, BODY or BODY.mass, .com, .inertia; {tree.body_names}"
                 raise ValueError(f"{word!r} is no parameter; expected {expected}")
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Parameters) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
 
     def add(self, name: str, values: Sequence[float], meaning: str) -> None:
         self.values[name], self.meanings[name] = tuple(map(float, values)), meaning
