@@ -69,8 +69,7 @@ def coriolis_matrix(model: Tree, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
 def gravity_balance(model: Tree, q: ArrayLike) -> np.ndarray:
     """Torque +dV/dq that holds the model at rest, without its springs.
 
-    Assignment, parts c and h; MuJoCo's qfrc_bias at rest.
-    Returns (..., nv), N m; of slides N.
+    Assignment, parts c and h; MuJoCo's qfrc_bias at rest. Returns (..., nv), N m; of slides N.
 
     >>> print(tmt.gravity_balance(tmt.ARM, [0.0, 0.0, np.pi / 2]).round(9) + 0.0)  # the arm hangs
     [0. 0. 0.]
@@ -97,8 +96,7 @@ def acceleration(model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> np
     """Accelerations qdd from Mbar qdd = tau - D qd - k (q - rest) - P q - S qd - h.
 
     P and S: position_gain and speed_gain of the model. Assignment, parts e and f; MuJoCo's qacc without
-    contacts, limits and dry friction.
-    Returns (..., nv), rad/s2; of slides m/s2.
+    contacts, limits and dry friction. Returns (..., nv), rad/s2; of slides m/s2.
 
     >>> q, rest = np.array([0.5, 0.3, 1.0]), np.zeros(3)
     >>> print(tmt.acceleration(tmt.ARM, q, rest, tmt.gravity_balance(tmt.ARM, q)).round(9) + 0.0)  # it is held
@@ -112,8 +110,7 @@ def inverse_dynamics(model: Tree, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -
     """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives qdd.
 
     The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it
-    is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators.
-    Returns (..., nv), N m; of slides N.
+    is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. Returns (..., nv), N m; of slides N.
 
     >>> q, qd, tau = np.array([0.5, 0.3, 1.0]), np.ones(3), np.array([1.0, 2.0, 3.0])
     >>> print(tmt.inverse_dynamics(tmt.ARM, q, qd, tmt.acceleration(tmt.ARM, q, qd, tau)).round(9))
@@ -143,8 +140,7 @@ def regressor(model: Tree, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> np.nd
 def potential_energy(model: Tree, q: ArrayLike) -> np.ndarray:
     """Potential energy V of gravity and springs.
 
-    0 with all centres of mass at the origin's height and the springs at rest.
-    Returns (...), J.
+    0 with all centres of mass at the origin's height and the springs at rest. Returns (...), J.
 
     >>> print(tmt.potential_energy(tmt.ARM, [0.0, 0.0, np.pi / 2]).round(9))  # -9.81 (1.9 0.15 + 1.5 (0.3 + 0.15))
     -9.4176
@@ -157,8 +153,7 @@ def energy(model: Tree, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
     """Total energy, kinetic and potential; infinite where it is beyond the largest double.
 
     Its zero is that of `potential_energy`; the model's position_gain adds nothing to it. NaN where all of q is
-    NaN, as it is from where a run of `simulate` has ended early.
-    Returns (...), J.
+    NaN, as it is from where a run of `simulate` has ended early. Returns (...), J.
 
     >>> print(tmt.energy(tmt.ARM, [0.0, 0.0, np.pi / 2], [0.0, 0.0, 2.0]).round(9))  # -9.4176 + 0.05275 2^2 / 2
     -9.3121

@@ -16,8 +16,7 @@ from tmt.model.values import require
 def com_positions(model: Tree, q: ArrayLike) -> np.ndarray:
     """Positions x_b of the centres of mass, in the inertial frame.
 
-    Assignment, part b, equation (1); MuJoCo's xipos.
-    Returns (..., m, 3), m.
+    Assignment, part b, equation (1); MuJoCo's xipos. Returns (..., m, 3), m.
 
     >>> print(tmt.com_positions(tmt.ARM, [0.0, 0.0, 0.0])[1] + 0.0)  # the upper arm hangs, the forearm points ahead
     [ 0.15  0.   -0.3 ]
@@ -29,8 +28,7 @@ def com_positions(model: Tree, q: ArrayLike) -> np.ndarray:
 def angular_velocities(model: Tree, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
     """Angular velocities omega_b = B_b qd, in body axes.
 
-    Assignment, part d.
-    Returns (..., m, 3), rad/s.
+    Assignment, part d. Returns (..., m, 3), rad/s.
 
     >>> print(tmt.angular_velocities(tmt.ARM, [0.0, 0.0, 0.0], [1.0, 0.0, 2.0])[1])  # both joints turn it about y
     [0. 3. 0.]
@@ -57,8 +55,7 @@ def convective_terms(model: Tree, q: ArrayLike, qd: ArrayLike) -> tuple[np.ndarr
     """v_conv = d(T_b qd)/dq qd in the inertial frame, and w_conv = d(B_b qd)/dq qd in body axes.
 
     What the centre of mass and the angular velocity of a body accelerate by at qdd = 0; h_b and g_b in the
-    assignment, part e.
-    Returns v_conv, w_conv : (..., m, 3), m/s2 and rad/s2.
+    assignment, part e. Returns v_conv, w_conv : (..., m, 3), m/s2 and rad/s2.
 
     >>> v_conv, w_conv = tmt.convective_terms(tmt.ARM, [0.0, 0.0, 0.0], [0.0, 0.0, 2.0])
     >>> print(v_conv[1])  # towards the elbow: 0.15 m times (2 rad/s)^2
@@ -71,8 +68,7 @@ def convective_terms(model: Tree, q: ArrayLike, qd: ArrayLike) -> tuple[np.ndarr
 def com(model: Tree, q: ArrayLike) -> np.ndarray:
     """Position of the centre of mass of all bodies, in the inertial frame.
 
-    sum_b m_b x_b / sum_b m_b; MuJoCo's subtree_com of the world.
-    Returns (..., 3), m.
+    sum_b m_b x_b / sum_b m_b; MuJoCo's subtree_com of the world. Returns (..., 3), m.
 
     >>> print(tmt.com(tmt.ARM, [0.0, 0.0, np.pi / 2]).round(9)[2])  # -(1.9 0.15 + 1.5 (0.3 + 0.15)) / 3.4
     -0.282352941

@@ -82,7 +82,7 @@ def checked(
         if chosen and chosen.values:
             program.parameters = other_values(chosen, kind)
             numbers = {name: list(value) for name, value in program.parameters.items()}
-            other = tmt.Tree(**vars(chosen.applied(tree, numbers)))
+            other = tmt.Tree(**vars(chosen.applied(numbers)))
             for name in names:
                 more = rows_of(program, name, other, states, factor)
                 rows += [row._replace(quantity=row.quantity + OTHER) for row in more]

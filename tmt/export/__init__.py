@@ -179,7 +179,7 @@ def traced(model: Tree, name: str, words: tuple[str, ...] = ()) -> Traced:
     parameters = Parameters(model, words)
 
     def tree_of(arrays: Sequence[Values]) -> Mechanism:
-        return parameters.applied(model, dict(zip(parameters.values, arrays)))
+        return parameters.applied(dict(zip(parameters.values, arrays)))
 
     sizes = [len(value) for value in parameters.values.values()]
     return forms.quantity(model, name, sizes, tree_of if sizes else None)
