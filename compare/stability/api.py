@@ -2,7 +2,7 @@
 
 from __future__ import annotations  # so that help() shows the short names of types
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -13,7 +13,7 @@ from ..core.finding import Finding
 from ..core.text import screen
 from ..engines.mujoco.names import INTEGRATORS, integrator_by_name
 from ..engines.mujoco.reading import read
-from .answer import Answer, Question, StepLimitRow, answer
+from .answer import Question, StepLimitRow, answer
 from .motion import posture_of, postures_of
 
 if TYPE_CHECKING:
@@ -22,35 +22,26 @@ if TYPE_CHECKING:
 __all__ = ["StepLimitRow", "StepLimits", "step_limits"]
 
 
-class StepLimits(Sequence[StepLimitRow]):
-    """The rows of `step_limits`: a sequence, also by the name of an integrator. print() shows the table."""
-
-    def __init__(self, rows: Sequence[StepLimitRow]) -> None:
-        self.rows = list(rows)
+class StepLimits(list[StepLimitRow]):
+    """The rows of `step_limits`: a list, also by the name of an integrator. print() shows the table."""
 
     def __getitem__(self, key: Any) -> Any:
         """limits["Euler"], limits[0], limits[:2]."""
         if not isinstance(key, str):
-            return self.rows[key]
-        found = {row.integrator: row for row in self.rows}
+            return super().__getitem__(key)
+        found = {row.integrator: row for row in self}
         if key not in found:
             raise KeyError(f"{key!r} was not asked for: expected one of {', '.join(found)}")
         return found[key]
 
-    def __len__(self) -> int:
-        return len(self.rows)
-
-    def __iter__(self) -> Iterator[StepLimitRow]:
-        return iter(self.rows)
-
     def __repr__(self) -> str:
-        return "\n".join(screen(Finding("step_limits", "limits", {"rows": self.rows})))
+        return "\n".join(screen(Finding("step_limits", "limits", {"rows": [*self]})))
 
     def to_frame(self) -> pd.DataFrame:
         """The rows as a DataFrame of pandas, a column for each field."""
         import pandas  # it takes long to load
 
-        return pandas.DataFrame([row.record() for row in self.rows])
+        return pandas.DataFrame([row.record() for row in self])
 
 
 def step_limits(
@@ -116,21 +107,17 @@ def step_limits(
     for name, number in numbers.items():
         if number is not None and not 0.0 < number < np.inf:
             raise ValueError(f"{name} is {number}: expected a number above 0")
-    recorded = None
-    if controls is not None:
+    recorded: Mapping[str, Any] | None = None
+    if isinstance(controls, Mapping):
+        recorded = {name: np.asarray(values, float) for name, values in controls.items()}
+    elif controls is not None:
         from ..robots.scene_file import read_controls
 
         names = reading.drive.names if reading.drive else ()
-        is_path = isinstance(controls, str | PathLike)
-        recorded = (
-            read_controls(str(controls), names, reading.dt)
-            if is_path
-            else {name: np.asarray(values, float) for name, values in cast(Any, controls).items()}
-        )
+        recorded = read_controls(str(controls), names, reading.dt)
     question = Question(
         reading.dt, reading.integrator, [integrator_by_name(name) for name in integrators or INTEGRATORS],
         push, error, recorded, control_period, delay, kp, kv,
     )  # fmt: skip
     place = posture_of(posture, reading) if posture is not None else postures_of(reading)[0]
-    found: Answer = answer(reading, place, question)
-    return StepLimits(found.rows)
+    return StepLimits(answer(reading, place, question).rows)

@@ -91,11 +91,6 @@ def compiled(field):
     return lambda path: np.ravel(getattr(mujoco.MjModel.from_xml_path(str(path)), field))[-3:]
 
 
-def turn(path):
-    placement = pinocchio(path).jointPlacements[1].rotation
-    return placement @ placement.T
-
-
 def masses(engine):
     """The masses of bodies that an engine has, largest first."""
     return {
@@ -126,9 +121,8 @@ CLASS = '<default><default class="c">{}</default></default>'
 GRAVITY = ARM.format('<option gravity="1 2 -3"/>', HINGE, "")
 NO_GRAVITY = ARM.format('<option><flag gravity="disable"/></option>', HINGE, "")
 BOUNDS = OF_GEOMS.format('<compiler boundmass="9" boundinertia="1"/>')
-RANGE = OF_GEOMS.format('<compiler inertiagrouprange="3 3"/>').replace(
-    SPHERE, SPHERE + BOX.format('group="3"')
-)
+GROUPS = OF_GEOMS.format('<compiler inertiagrouprange="3 3"/>')
+RANGE = GROUPS.replace(SPHERE, SPHERE + BOX.format('group="3"'))
 SHELL = OF_GEOMS.format("").replace(SPHERE, BOX.format('shellinertia="true"'))
 # the kind of cause, the engine, the file; what the engine has, by itself, and what MuJoCo has: they differ
 CASES = (

@@ -14,7 +14,7 @@ from helpers.runs import posix
 
 import compare
 from compare.core.text import say
-from compare.engines.mujoco import ModelError, Source, parse, read
+from compare.engines.mujoco import ModelError, Source, engine, parse, read
 from compare.engines.mujoco.parameters import remarks
 from compare.robots.arm import ARM
 
@@ -253,3 +253,17 @@ def test_the_base_of_a_urdf_floats_where_that_is_asked():
     assert pickle.loads(pickle.dumps(floating)).without({"j": 0.0}).nv == 6
     with pytest.raises(ModelError, match="only the base of a URDF"):
         Source(BOX.format(STATED), True)
+
+
+LINKS = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>{}
+  <body name="b" pos="0.3 0 0"><joint name="k" axis="0 1 0"/>
+  <inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.1"/></body></body></worldbody></mujoco>"""
+MASS = '<inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.1 0.1"/>'
+
+
+def test_a_file_with_a_body_more_on_a_joint_than_the_solution_is_refused_with_both_numbers():
+    more, less = read(LINKS.format(MASS)), read(LINKS.format(""))
+    assert len(engine(more, more).bodies) == 2 and len(engine(less, less).bodies) == 1
+    for file, solution, found, stated in ((more, less, 1, 0), (less, more, 0, 1)):
+        with pytest.raises(ModelError, match=f"on joint j: {found}, in the solution {stated}"):
+            engine(file, solution)

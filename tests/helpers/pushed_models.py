@@ -5,7 +5,7 @@ import numpy as np
 
 INERTIA, KP, KV = 0.05, 20.0, 5.0  # kg m2, N m/rad, N m s/rad
 # one hinge about an upright axis: gravity does nothing
-HINGE = """<mujoco><option timestep="{dt}" integrator="{integrator}" {option}/><worldbody><body name="arm">
+HINGE = """<mujoco><option timestep="{dt}"/><worldbody><body name="arm">
   <joint name="turn" axis="0 0 1" {joint}/><inertial pos="0 0 0" mass="1" diaginertia="0.05 0.05 0.05"/></body></worldbody>
   <actuator>{actuator}</actuator><keyframe>{keys}</keyframe></mujoco>"""
 SPHERE = """<mujoco><default><geom solref="0.02 {dampratio}" solimp="0.9 0.9 0.001"/></default>
@@ -28,9 +28,8 @@ SERVO = f'<position name="servo" joint="turn" kp="{KP}" kv="{KV}"/>'
 LIMIT = (-KV + (KV**2 + 4.0 * INERTIA * KP) ** 0.5) / KP  # s, of Euler with this servo: 17.5 ms
 
 
-def hinge(actuator=SERVO, dt=0.002, integrator="Euler", joint="", option="", keys=""):
-    more = {"joint": joint, "option": option, "keys": keys}
-    return HINGE.format(actuator=actuator, dt=dt, integrator=integrator, **more)
+def hinge(actuator=SERVO, dt=0.002, joint="", keys=""):
+    return HINGE.format(actuator=actuator, dt=dt, joint=joint, keys=keys)
 
 
 def sphere(dampratio=1.0, impratio=1.0, pull=0.0, condim=1, x='stiffness="50" damping="50"'):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers import pushed_models as models
 from helpers.pushed_models import (
     BOX,
     FLOOR,
@@ -12,7 +13,6 @@ from helpers.pushed_models import (
     end_speed,
     hinge,
     leg,
-    linear_limit,
     sphere,
     walker,
 )
@@ -26,12 +26,15 @@ def limits(text, *integrators, **more):
     return compare.step_limits(text, integrators=integrators or None, **more)
 
 
+def euler(text, **more):
+    return limits(text, "Euler", **more)["Euler"]
+
+
 def test_a_servo_of_one_hinge_has_the_limit_of_its_two_by_two_step():
-    row = limits(hinge(), "Euler")["Euler"]
+    row = euler(hinge())
     assert row.stable_up_to_s < LIMIT < row.fails_at_s * 1.02 and row.stable_up_to_s > 0.9 * LIMIT
-    assert (
-        row.fails_at_s / row.stable_up_to_s < 1.061 and row.moves_first == "turn" and row.judged_by == "rest"
-    )
+    assert row.fails_at_s / row.stable_up_to_s < 1.061
+    assert row.moves_first == "turn" and row.judged_by == "rest"
     assert limits(hinge(), "implicitfast")["implicitfast"].fails_at_s is None
 
 
@@ -50,7 +53,7 @@ def test_a_floor_raises_the_limit_of_euler_and_lowers_that_of_implicitfast():
         on_floor = limits(leg(integrator), integrator)[integrator]
         above = limits(leg(integrator, -5.0, 'stiffness="1e5" damping="1e3"'), integrator)[integrator]
         assert (on_floor.stable_up_to_s > above.longest_s) is is_raised
-        assert on_floor.stable_up_to_s < 1.03 * linear_limit(leg(integrator), integrator)
+        assert on_floor.stable_up_to_s < 1.03 * models.linear_limit(leg(integrator), integrator)
 
 
 @pytest.mark.parametrize("text", [
@@ -60,20 +63,16 @@ def test_plain_runs_with_other_signs_hold_below_and_fail_above(text):
     for row in limits(text, "Euler", "RK4")[: 1 if 'size="0.1" mass="2"' in text else 2]:
         rest = row.creep_rad_per_s + max(0.01, row.push_rad_per_s / 2.0)
         steps = [(0.94 * (row.stable_up_to_s or 0.0), True), (1.08 * (row.fails_at_s or 0.0), False)]
-        for dt, holds in steps:
-            ends = (
-                [end_speed(text, dt, row.integrator, row.push_rad_per_s, seed) for seed in range(3)]
-                if dt
-                else []
-            )
-            assert not ends or all(speed <= rest for speed in ends) is holds
+        for dt, holds in [(dt, holds) for dt, holds in steps if dt]:
+            ends = [end_speed(text, dt, row.integrator, row.push_rad_per_s, seed) for seed in range(3)]
+            assert all(speed <= rest for speed in ends) is holds
 
 
 def test_dry_friction_does_not_hide_what_a_push_shows():
     """It holds small deviations at any step: kv of 5 at twice the limit."""
     stuck = hinge(joint='frictionloss="0.05"', dt=2.0 * LIMIT)
     assert end_speed(stuck, 2.0 * LIMIT, "Euler", 1e-6) < 1e-3
-    row = limits(stuck, "Euler")["Euler"]
+    row = euler(stuck)
     assert not row.stable_at_file_dt and row.stable_up_to_s < 1.1 * LIMIT
 
 
@@ -83,28 +82,21 @@ def test_the_solvers_iterations_are_part_of_the_file():
 
 
 def test_what_moves_on_by_itself_is_judged_by_divergence_alone():
-    falling = limits(UPRIGHT.format("", ""), "Euler")["Euler"]
-    assert (
-        falling.judged_by == "divergence"
-        and falling.by_itself == "rests"
-        and falling.survived_rad_per_s == 0.0
-    )
+    falling = euler(UPRIGHT.format("", ""))
+    assert falling.judged_by == "divergence" and falling.survived_rad_per_s == 0.0
+    assert falling.by_itself == "rests"
     tilted = UPRIGHT.format('damping="0.01"', '<keyframe><key name="tilted" qpos="0.3"/></keyframe>')
-    row = limits(tilted, "Euler")["Euler"]
+    row = euler(tilted)
     assert row.by_itself == "moves on" and row.stable_at_file_dt and row.unpushed_rad_per_s > 0.05
-    free = limits(BOX.format(floor=""), "Euler")["Euler"]
+    free = euler(BOX.format(floor=""))
     assert free.by_itself == "moves on" and free.stable_at_file_dt
-    assert limits(BOX.format(floor=FLOOR), "Euler")["Euler"].by_itself == "rests"
+    assert euler(BOX.format(floor=FLOOR)).by_itself == "rests"
 
 
 def test_what_diverges_while_it_falls_is_told():
-    text = (
-        UPRIGHT.format("", "")
-        .replace('damping=""', "")
-        .replace("<geom", '<joint name="tail" axis="1 0 0"/><geom')
-    )
+    text = UPRIGHT.format("", "").replace("<geom", '<joint name="tail" axis="1 0 0"/><geom')
     servo = '<actuator><position joint="tail" kp="2000" kv="200"/></actuator></mujoco>'
-    row = limits(text.replace("</mujoco>", servo), "Euler")["Euler"]
+    row = euler(text.replace("</mujoco>", servo))
     assert row.judged_by == "divergence" and not row.stable_at_file_dt and row.outcome == "diverges"
 
 
@@ -129,38 +121,36 @@ def test_weak_growth_is_seen_in_a_longer_run():
 
 def test_a_push_that_is_stated_is_not_lowered():
     spring = UPRIGHT.format('stiffness="3" damping="0.3"', "")  # rests upright, falls beyond a small push
-    assert limits(spring, "Euler")["Euler"].survived_rad_per_s > 0.0
-    row = limits(UPRIGHT.format("", ""), "Euler", push=0.5)["Euler"]
+    assert euler(spring).survived_rad_per_s > 0.0
+    row = euler(UPRIGHT.format("", ""), push=0.5)
     assert row.judged_by == "falls" and row.push_rad_per_s == 0.5 and row.stable_up_to_s is None
     assert "not judged" in str(limits(UPRIGHT.format("", ""), "Euler", push=0.5))
 
 
 def test_no_finite_fine_run_is_not_judged():
     stiff = hinge('<position joint="turn" kp="1e14"/>', keys='<key name="off" qpos="0.2" ctrl="0.1"/>')
-    row = limits(stiff, "Euler")["Euler"]
+    row = euler(stiff)
     assert row.judged_by == "" and row.stable_at_file_dt is None and row.stable_up_to_s is None
 
 
 def test_a_keyframe_with_speeds_is_judged_joint_by_joint():
     spin = hinge('<motor joint="turn"/>', keys='<key name="spin" qvel="3"/>')
-    row = limits(spin, "Euler")["Euler"]
+    row = euler(spin)
     assert row.by_itself == "in motion" and row.stable_at_file_dt and row.kept == pytest.approx(1.0, rel=1e-6)
 
 
 def test_an_equality_that_does_not_hold_at_the_start_is_told():
     other = '<body name="b"><joint name="other" axis="0 0 1"/><geom size="0.1"/></body></worldbody>'
     text = hinge().replace("</worldbody>", other)
-    text = text.replace(
-        "</mujoco>",
-        '<equality><joint joint1="turn" joint2="other" polycoef="0.8 1 0 0 0"/></equality></mujoco>',
-    )
-    row = limits(text, "Euler")["Euler"]
-    assert "jump" in row.starts and limits(hinge(), "Euler")["Euler"].starts == ""
+    tie = '<equality><joint joint1="turn" joint2="other" polycoef="0.8 1 0 0 0"/></equality>'
+    text = text.replace("</mujoco>", f"{tie}</mujoco>")
+    row = euler(text)
+    assert "jump" in row.starts and euler(hinge()).starts == ""
 
 
 def test_what_creeps_is_told_by_the_law_of_a_soft_contact():
     """Speed g_t (1 - d) / (d b impratio), b = 2 / (d timeconst), of one sticking contact under a pull."""
-    row = limits(sphere(impratio=3.0, pull=2.0, condim=3, x=""), "Euler")["Euler"]
+    row = euler(sphere(impratio=3.0, pull=2.0, condim=3, x=""))
     d = 0.9
     speed = 2.0 * (1.0 - d) / (d * 2.0 / (d * 0.02) * 3.0)
     assert row.creep_rad_per_s == pytest.approx(speed, rel=0.02) and row.creeping_joint == "x"
@@ -175,12 +165,9 @@ def test_distance_from_fine_steps_falls_with_the_step_and_with_the_order():
 
 
 def test_the_longest_step_within_an_error_is_shorter():
-    row = limits(hinge(), "Euler", error=1e-3)["Euler"]
-    assert (
-        0.0 < row.within_error_s < row.stable_up_to_s
-        and limits(hinge(), "Euler")["Euler"].within_error_s is None
-    )
-    assert limits(hinge(), "Euler", error=1e-12)["Euler"].within_error_s is None
+    row = euler(hinge(), error=1e-3)
+    assert 0.0 < row.within_error_s < row.stable_up_to_s
+    assert euler(hinge(), error=1e-12).within_error_s is None
 
 
 def test_a_rod_that_tumbles_as_it_falls_through_air_is_as_stable_as_at_fine_steps():
@@ -188,5 +175,5 @@ def test_a_rod_that_tumbles_as_it_falls_through_air_is_as_stable_as_at_fine_step
     text = """<mujoco><option density="1.2" viscosity="1e-3"/><worldbody><body><freejoint name="rod"/>
     <geom type="capsule" size=".03 .12" density="700"/></body></worldbody>
     <keyframe><key qpos="0 0 1 1 0 0.2 0" qvel="0.2 -0.1 -0.4 -0.2 -0.3 0.5"/></keyframe></mujoco>"""
-    row = limits(text, "Euler")["Euler"]
+    row = euler(text)
     assert row.judged_by == "speed" and row.stable_at_file_dt and row.fails_at_s is None

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from helpers.edited import setup_of_file
 
@@ -33,6 +32,12 @@ def said(result, kind):
     return [say(text) for text in result.top if text.kind == kind]
 
 
+@pytest.fixture(scope="module")
+def full():
+    """A run alone: all integrators, at all postures."""
+    return found_of(size=Setup.small, alone=True)
+
+
 def row(up_to=0.01, fails=0.0106, stable=True, posture="p", **more):
     usual = {
         "judged_by": "rest",
@@ -48,20 +53,21 @@ def row(up_to=0.01, fails=0.0106, stable=True, posture="p", **more):
     )  # fmt: skip
 
 
-def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all():
-    rows = found_of().tables["step_limits"]
+def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all(full):
+    quick = found_of()
+    rows = quick.tables["step_limits"]
     assert [(row.posture, row.integrator) for row in rows] == [("home", "Euler")]
-    full = found_of(size=Setup.small, alone=True)
     names = [(row.posture, row.integrator) for row in full.tables["step_limits"]]
     assert names == [*(("home", name) for name in INTEGRATORS), ("spin", "Euler")]
     tried = full.tables["stability_runs"]
     assert {row.push_rad_per_s for row in tried if row.posture == "home"} >= {0.03, 0.1, 0.3}
-    names = [figure()[0] for figure in stability.figures(full, None)]
     rows = [replace(row, outcome="moves") if row.integrator == "RK4" else row for row in tried]
     of_none = replace(full, tables=full.tables | {"stability_runs": rows})  # RK4 survives no push
-    ((_, fig, _),) = [figure() for figure in stability.figures(of_none, None)]
+    (name, fig, _), (of_quick, *_) = [
+        draw() for of in (of_none, quick) for draw in stability.figures(of, None)
+    ]
     assert {text.get_text() for text in fig.legends[0].texts} == set(INTEGRATORS)
-    assert names == ["stability_steps"] == [figure()[0] for figure in stability.figures(found_of(), None)]
+    assert name == of_quick == "stability_steps"
 
 
 @pytest.mark.parametrize("dt, asked, quantity, passes", [
@@ -92,22 +98,17 @@ def test_the_posture_that_is_asked_for_is_the_start():
 def test_a_step_that_fails_is_said_with_what_helps():
     result = found_of(own_dt=1.4 * LIMIT, size=Setup.small)
     (answer,) = said(result, "answer")
-    assert (
-        answer.startswith("Not stable") and "home" in answer and "(turn)" in answer and "19 ms" not in answer
-    )
+    assert answer.startswith("Not stable") and "home" in answer and "(turn)" in answer
     (helps,) = said(result, "remedies")
     assert "implicitfast" in helps and "kv" in helps and "armature" in helps
-    assert not said(found_of(), "remedies") and said(found_of(), "answer")[0].startswith(
-        "Stable: 2 ms with Euler"
-    )
+    stable = found_of()
+    assert not said(stable, "remedies") and said(stable, "answer")[0].startswith("Stable: 2 ms with Euler")
 
 
-def test_the_table_of_a_run_alone_has_a_line_for_each_integrator_and_few_lines_in_all():
-    result = found_of(size=Setup.small, alone=True)
-    lines = [line for text in result.top for line in screen(text)]
-    assert len(lines) <= 12 and [line.split()[0] for line in lines if line.startswith(" ")][1:] == list(
-        INTEGRATORS
-    )
+def test_the_table_of_a_run_alone_has_a_line_for_each_integrator_and_few_lines_in_all(full):
+    lines = [line for text in full.top for line in screen(text)]
+    first = [line.split()[0] for line in lines if line.startswith(" ")]
+    assert len(lines) <= 12 and first[1:] == list(INTEGRATORS)
 
 
 @pytest.mark.parametrize("more, words", [
@@ -135,9 +136,8 @@ def test_what_the_robot_does_by_itself_is_said(result, by_itself, words):
     (None, None, None, None),
 ])  # fmt: skip
 def test_a_check_of_each_posture(result, up_to, fails, stable, passes):
-    of_file.check(
-        result, row(up_to, fails, stable, judged_by="rest" if stable is not None else ""), AT_OWN_STEP
-    )
+    judged_by = "rest" if stable is not None else ""
+    of_file.check(result, row(up_to, fails, stable, judged_by=judged_by), AT_OWN_STEP)
     (check,) = result.checks
     assert (check.passed if check.judged else None) is passes
 
@@ -160,12 +160,6 @@ def test_the_longest_step_within_an_error_is_told(result):
     of_file.tell(result, "within", rows=[row()], error=1e-9)
     first, second = said(result, "within")
     assert "9 ms with RK4" in first and "Euler: 4 ms" in first and "No step" in second
-
-
-def test_recorded_controls_are_judged():
-    times = np.linspace(0.0, 0.5, 26)
-    result = found_of(recorded={"time": times, "actuator 0": np.sin(9.0 * times)})
-    assert result.tables["step_limits"][0].controls == "record" and result.checks[0].passed
 
 
 @pytest.mark.parametrize("dt, is_refused", [(None, False), (1e-3, False), (1.1e-5, False), (0.9e-5, True)])
