@@ -180,6 +180,7 @@ AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2",
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
     kind = {"stability": StabilityResult, "trajectory": TrajectoryResult}.get(name, Result)
     of = section(name, GOOD, rows=rows, kind=kind)
+    of.result.centres = ("s",)  # postures whose limits of the step are told
     said = headline(section_with(name, of.result, ARM))
     found = re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?:e[+-]\d+)?", said.replace(" m2", ""))
     assert found == numbers.split() and named in said, said
