@@ -85,9 +85,8 @@ def with_sine_for_cosine(tree: tmt.Tree, q, qd, axis: int):
     moved, (T, _) = q.copy(), literal.jacobians(tree, q)
     moved[:, 0] = np.pi / 2.0 - q[:, 0]
     right, wrong = T[:, 0], T[:, 0].copy()
-    wrong[:, axis] = literal.jacobians(tree, moved)[0][:, 0, axis] * (
-        1.0 - 2.0 * (np.arange(len(tree.axis)) == 0)
-    )
+    signs = 1.0 - 2.0 * (np.arange(len(tree.axis)) == 0)
+    wrong[:, axis] = literal.jacobians(tree, moved)[0][:, 0, axis] * signs
     force = tree.mass[0] * (literal.convective_terms(tree, q, qd)[0][:, 0] - np.array(tree.gravity))
     inertias = (tree.mass[0] * np.swapaxes(J, 1, 2) @ J for J in (wrong, right))
     return M + next(inertias) - next(inertias), h + np.einsum("sci,sc->si", wrong - right, force)
@@ -219,9 +218,8 @@ def diagnosis_of(fault: Fault, seed: int) -> Diagnosis:
 def outcome(fault: Fault) -> tuple[str, list[str]]:
     found = diagnosis_of(fault, seed=3)
     places = [cause.place for cause in found.causes]
-    named = [
-        cause for cause in found.causes if fault.place in (cause.place, f"{cause.place}: {cause.explains}")
-    ]
+    said = [(cause, (cause.place, f"{cause.place}: {cause.explains}")) for cause in found.causes]
+    named = [cause for cause, names in said if fault.place in names]
     if named and (not fault.values or np.isclose(named[0].explains, fault.values[0], rtol=1e-6, atol=1e-9)):
         return "named", places
     if not found.causes:

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.text import block, say
-from .comparison import Comparison
-from .records import State
+from .comparison import Comparison, State
 from .tree import tree
 from .why import Why, cause_of
 
@@ -179,13 +178,12 @@ def differences(
 def rows(comparison: Comparison, cause: str) -> list[Difference]:
     """Every entry of every quantity at every state, the largest ratio first."""
     found = []
-    for name, compared in comparison.compared.items():
-        entries = comparison.entries(name)
-        columns = compared.yours, compared.right, compared.tolerance, compared.ratio
-        places = np.ndindex(compared.yours.shape)
-        for at, yours, right, tolerance, ratio in zip(places, *(part.ravel().tolist() for part in columns)):
+    for name, (yours, right, _, tolerance) in comparison.compared.items():
+        entries, ratios = comparison.entries(name), comparison.compared[name].ratio
+        columns = (part.ravel().tolist() for part in (yours, right, yours - right, tolerance, ratios))
+        for at, own, theirs, off, allowed, ratio in zip(np.ndindex(yours.shape), *columns):
             where, why = (name, entries[at[1:]], comparison.states[at[0]]), cause if ratio > 1.0 else ""
-            found.append(Difference(*where, yours, right, yours - right, tolerance, ratio, why))
+            found.append(Difference(*where, own, theirs, off, allowed, ratio, why))
     return sorted(found, key=lambda row: -row.ratio)
 
 
@@ -199,12 +197,11 @@ def message(comparison: Comparison) -> str:
         if row.ratio > 1.0:
             failing.setdefault(row.quantity, []).append(row)
     joints = zip(comparison.tree.joint_names, comparison.tree.kind)
-    hinges = [name for name, kind in joints if kind == "hinge"]
     advice = None if why.is_found or comparison.rtol else rounded(comparison)
     said = [say(remark) for remark in remarks(comparison.reading, has_scenes=False)]
     values = {"comparison": comparison, "failing": failing, "why": why, "rounded": advice, "remarks": said}
-    values["compensated"] = comparison.compensated
-    text = block("agreement", "message", **values, hinge=hinges[0] if hinges else "")
+    hinge = next((name for name, kind in joints if kind == "hinge"), "")
+    text = block("agreement", "message", **values, compensated=comparison.compensated, hinge=hinge)
     return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
 
 

@@ -1,4 +1,8 @@
-"""The arguments of assert_agrees, validated, and each quantity of the user and of MuJoCo."""
+"""The arguments of assert_agrees, validated, and each quantity of the user and of MuJoCo at the states.
+
+Of a Coriolis matrix C, which Mbar and h do not determine, two quantities are compared: C qd, and C + C' = dMbar/dt, which
+says that dMbar/dt - 2 C is skew.
+"""
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -6,10 +10,12 @@ from functools import cached_property
 from itertools import product
 from os import PathLike
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
+from numpy import ndarray
 
+from tmt import literal
 from tmt.model.lock import CLOSE_TO_ONE
 from tmt.model.values import shown
 
@@ -17,23 +23,68 @@ from ..core.text import say
 from ..core.words import capital
 from ..engines.own import METHOD_NAMES, QUANTITIES, OwnEquations, OwnError
 from ..engines.own.functions import (
+    Quantity,
     converted,
     in_shape,
     in_words,
     is_function,
     numbers_of,
+    state_in_words,
 )
+from ..judge.agree import over, share_of
 from ..judge.entries import Entries
 from ..judge.scale import EPS, FACTOR
 from ..robots.file import robot_of
 from ..robots.joint_map import joint_map
 from ..robots.scene import is_number
 from ..robots.states import random
-from .coriolis import OF_CORIOLIS, parts, right_parts, scales_of_parts
-from .records import COMPARED, SYMBOLS, Compared, State
 
 DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
+PRODUCT, SYMMETRIC = "C qd", "C + C'"
+OF_CORIOLIS = {PRODUCT: Quantity(2, ("nv",)), SYMMETRIC: Quantity(2, ("nv", "nv"))}
+COMPARED = QUANTITIES | OF_CORIOLIS
+SYMBOLS = {  # of entries
+    "mass_matrix": "M", "bias": "h", "gravity": "g", "acceleration": "qdd", "coriolis_matrix": "C",
+    PRODUCT: f"({PRODUCT})", SYMMETRIC: f"({SYMMETRIC})",
+}  # fmt: skip
+
+
+class State(NamedTuple):
+    """A state in the user's joints."""
+
+    number: int
+    q: tuple[float, ...]
+    qd: tuple[float, ...]
+    tau: tuple[float, ...]
+
+    def said(self, quantity: str) -> str:
+        """What of the state a quantity depends on, as it can be typed."""
+        return state_in_words((self.q, self.qd, self.tau)[: COMPARED[quantity].arguments])
+
+
+class Compared(NamedTuple):
+    """One quantity at all states, (states, ...), in the user's joints."""
+
+    yours: ndarray
+    right: ndarray  # MuJoCo's
+    rounding: ndarray  # 64 eps x scale
+    tolerance: ndarray  # the same and rtol x the largest value that the entry has at these states
+
+    @property
+    def ratio(self) -> ndarray:
+        """Of the difference to the tolerance; 0 if both are 0, inf if the user's value is not finite."""
+        return share_of(np.abs(self.yours - self.right), self.tolerance)
+
+    @property
+    def fails(self) -> bool:
+        return bool((self.ratio > 1.0).any())
+
+    @property
+    def least_rtol(self) -> float:
+        """The rtol with which all entries agree; NaN or inf where none does."""
+        beyond = np.maximum(np.abs(self.yours - self.right) - self.rounding, 0.0)
+        return float(over(beyond, np.broadcast_to(np.abs(self.right).max(axis=0), beyond.shape)).max())
 
 
 def origin_of(mjcf: Any) -> Any:
@@ -43,12 +94,18 @@ def origin_of(mjcf: Any) -> Any:
 
 
 class Comparison:
-    """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`."""
+    """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`.
+
+    brought: what is given. values, right, tolerances: of each quantity in the model's joints, (states, ...). compared: the
+    same in the user's. coriolis: the user's matrix. problems: other errors of the user's functions, a line each.
+    """
 
     def __init__(
         self, mjcf: Any, quantities: Mapping[str, Any], q: Any, qd: Any, tau: Any,
         joints: Sequence[str] | None, rtol: float, states: int, seed: int,
     ) -> None:  # fmt: skip
+        from ..engines.mujoco import engine, read, tree_with_sites  # here: `import compare` need not wait
+
         self.brought = {name: value for name, value in quantities.items() if value is not None}
         if not self.brought:
             expected = [name for name in SYMBOLS if name in QUANTITIES]
@@ -56,9 +113,11 @@ class Comparison:
         if not is_number(rtol) or rtol < 0.0:
             raise ValueError(f"rtol is {shown(rtol)}; expected a number of at least 0")
         self.rtol, self.rounding = float(rtol), FACTOR * EPS + float(rtol)
-        self.coriolis = np.zeros(0)  # the user's, (states, nv, nv)
-        self.problems: list[str] = []  # other errors of the user's functions at the states, a line each
-        self.read(mjcf)
+        self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
+        self.robot = robot_of(self.reading, "the model")
+        self.mujoco = engine(self.reading).of(self.robot.case())
+        self.tree, self.coordinates = tree_with_sites(self.reading), self.robot.coordinates
+        self.warned: list[str] = []
         try:
             self.take(q, qd, tau, joints, states, seed)
         except OwnError as error:
@@ -66,102 +125,75 @@ class Comparison:
 
             loop = closed_loop(self.reading, "the model")  # of which equations may have fewer joints
             raise OwnError(f"{error}. {capital(say(loop))}." if loop else str(error)) from error
+        for text in self.warned:
+            warnings.warn(text, stacklevel=3)
+        self.compare()
 
     def take(self, q: Any, qd: Any, tau: Any, joints: Sequence[str] | None, states: int, seed: int) -> None:
-        """The functions and the states; the user's values at these."""
+        """The functions, the states, and the user's values at these."""
         self.joints = joint_map(self.coordinates, joints)
         functions = {name: value for name, value in self.brought.items() if is_function(value)}
         self.equations: OwnEquations | None = None  # of the user's functions, if there are any
         if functions:
             self.equations = OwnEquations(functions, self.coordinates, self.joints, self.tree, ())
-        if q is not None:
+        if q is None:
+            for name, value in (self.brought | {"qd": qd, "tau": tau}).items():
+                if value is not None and name not in functions:
+                    expected = f"a function, or q of shape (states, {self.coordinates.nq})"
+                    raise ValueError(f"{name} is {shown(value)}, and q is not given; expected {expected}")
+            self.take_random(cast(OwnEquations, self.equations), states, seed)
+        else:
             self.take_states(q, qd, tau)
-            if (
-                np.ndim(qd)
-                and not self.qd.any()
-                and {"bias", "acceleration", "coriolis_matrix"} & {*self.brought}
-            ):
-                warnings.warn("qd is 0 at all states: no velocity terms are compared", stacklevel=4)
+            needs_speeds = {"bias", "acceleration", "coriolis_matrix"} & {*self.brought}
+            if np.ndim(qd) and not self.qd.any() and needs_speeds:
+                self.warned.append("qd is 0 at all states: no velocity terms are compared")
             if states != DEFAULT_STATES:
-                text = f"states={shown(states)} is not used: the {len(self.q)} states of q are compared"
-                warnings.warn(text, stacklevel=4)
-            self.values  # noqa: B018  # validated
-            return
-        for name, value in (self.brought | {"qd": qd, "tau": tau}).items():
-            if value is not None and name not in functions:
-                expected = f"a function, or q of shape (states, {self.coordinates.nq})"
-                raise ValueError(f"{name} is {shown(value)}, and q is not given; expected {expected}")
-        self.take_random(states, seed)
+                used = f"the {len(self.q)} states of q are compared"
+                self.warned.append(f"states={shown(states)} is not used: {used}")
+        self.values = {
+            name: self.asked(self.equations, name) if name in functions else self.table(name, value)
+            for name, value in self.brought.items()
+        }
+        self.problems = [problem.text for problem in self.equations.problems] if self.equations else []
 
-    def read(self, mjcf: Any) -> None:
-        from ..engines.mujoco import engine, read, tree_with_sites  # here: `import compare` need not wait
-
-        self.reading = cast(Any, read(origin_of(mjcf)))  # its source may be a model
-        self.robot = robot_of(self.reading, "the model")
-        self.mujoco = engine(self.reading).of(self.robot.case())
-        self.tree, self.coordinates = tree_with_sites(self.reading), self.robot.coordinates
-
-    def take_random(self, states: int, seed: int) -> None:
+    def take_random(self, equations: OwnEquations, states: int, seed: int) -> None:
         """Random states, fewer if the user's functions are slow."""
         for name, value, least in (("states", states, 1), ("seed", seed, 0)):
             if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
                 raise ValueError(f"{name} is {shown(value)}; expected a whole number of at least {least}")
-        sample, equations = random(self.robot, states, 0, seed), self.equations
-        for note in sample.notes:
-            warnings.warn(say(note), stacklevel=5)
-        assert equations is not None  # all that was brought are functions
+        sample = random(self.robot, states, 0, seed)
+        self.warned += map(say, sample.notes)
         equations.try_at(sample.q, sample.qd, sample.tau)
         count = equations.affordable(len(sample.q), OWN_SECONDS)
         if count < len(sample.q):
             time = f"{equations.seconds:.2g} s per state"
-            warnings.warn(f"{count} states instead of {states}: your functions take {time}", stacklevel=5)
+            self.warned.append(f"{count} states instead of {states}: your functions take {time}")
         self.q, self.qd, self.tau = sample.q[:count], sample.qd[:count], sample.tau[:count]
 
     def take_states(self, q: Any, qd: Any, tau: Any) -> None:
         """The given states, in the user's joints."""
         self.q = self.joints.positions(rows_given("q", q, ("states", self.coordinates.nq)))
-        shape, others = (len(self.q), self.coordinates.nv), {"qd": qd, "tau": tau}
-        for name, value in others.items():
+        shape, rows = (len(self.q), self.coordinates.nv), {}
+        for name, value in {"qd": qd, "tau": tau}.items():
             needed = [quantity for quantity in self.brought if name in QUANTITIES[quantity].state]
             if value is None and needed:
                 raise ValueError(f"{needed[0]} depends on {name}; expected {name} of shape {shape}, or 0.0")
-        rows = {name: rows_given(name, 0.0 if x is None else x, shape) for name, x in others.items()}
+            rows[name] = rows_given(name, 0.0 if value is None else value, shape)
         self.qd, self.tau = self.joints.speeds(rows["qd"]), self.joints.forces(rows["tau"])
         for joint, name in zip(self.coordinates.places.joints, self.coordinates.names):
-            if joint.kind == "ball":
-                lengths = np.linalg.norm(self.q[:, joint.q], axis=1)
-                if np.abs(lengths - 1.0).max() > CLOSE_TO_ONE:
-                    wanted = "a quaternion of length 1 at every state; expected w, x, y, z"
-                    raise ValueError(f"q of {name} is not {wanted}")
-
-    @cached_property
-    def states(self) -> list[State]:
-        """The states, in the user's joints."""
-        joints = self.joints
-        own = joints.own_positions(self.q), joints.own_speeds(self.qd), joints.own_forces(self.tau)
-        return [State(i, *map(tuple, state)) for i, state in enumerate(zip(*(part.tolist() for part in own)))]
-
-    @cached_property
-    def values(self) -> dict[str, np.ndarray]:
-        """The user's values of each quantity, in the model's joints, (states, ...)."""
-        values, equations = {}, self.equations
-        for name, brought in self.brought.items():
-            is_table = equations is None or not equations.has(name)
-            values[name] = self.table(name, brought) if is_table else self.asked(equations, name)
-        if "coriolis_matrix" in values:
-            self.coriolis = values.pop("coriolis_matrix")
-            values |= parts(self.coriolis, self.qd)
-        self.problems = [problem.text for problem in equations.problems] if equations is not None else []
-        return values
+            lengths = np.linalg.norm(self.q[:, joint.q], axis=1)
+            if joint.kind == "ball" and np.abs(lengths - 1.0).max() > CLOSE_TO_ONE:
+                wanted = "a quaternion of length 1 at every state; expected w, x, y, z"
+                raise ValueError(f"q of {name} is not {wanted}")
 
     def asked(
-        self, source: object, name: str, q: np.ndarray | None = None, qd: np.ndarray | None = None
-    ) -> np.ndarray:
+        self, source: object, name: str, q: ndarray | None = None, qd: ndarray | None = None
+    ) -> ndarray:
         """A quantity of an engine at the states, or at others."""
         state = self.q if q is None else q, self.qd if qd is None else qd, self.tau
         return np.asarray(getattr(source, METHOD_NAMES[name])(*state[: QUANTITIES[name].arguments]))
 
-    def table(self, name: str, brought: object) -> np.ndarray:
+    def table(self, name: str, brought: object) -> ndarray:
         """An array of the user's values in the model's joints; a row may hold Mbar flattened by rows."""
         count, nv = len(self.q), self.coordinates.nv
         array, shape = numbers_of(brought), (count, *QUANTITIES[name].shape_for(nv))
@@ -169,65 +201,55 @@ class Comparison:
             flat = in_shape(array, (count, nv * nv))
             brought = brought if flat is None else flat.reshape(count, nv, nv)
         values = converted(name, brought, shape, ", or a function", ", its values at the given q")
-        is_matrix = len(QUANTITIES[name].shape) == 2
-        return self.joints.mass_matrix(values) if is_matrix else self.joints.forces(values)
+        return self.joints.mass_matrix(values) if len(shape) == 3 else self.joints.forces(values)
 
-    @cached_property
-    def right(self) -> dict[str, np.ndarray]:
-        """MuJoCo's values of each quantity, in the model's joints."""
-        plain = {name: self.asked(self.mujoco, name) for name in self.values if name not in OF_CORIOLIS}
-        has_coriolis = OF_CORIOLIS.keys() <= self.values.keys()
-        return plain | (right_parts(self.mujoco, self.tree, self.q, self.qd) if has_coriolis else {})
+    def compare(self) -> None:
+        """MuJoCo's values, the tolerances, and all in the user's joints."""
+        self.coriolis = self.values.pop("coriolis_matrix", np.zeros(0))
+        self.right = {name: self.asked(self.mujoco, name) for name in self.values}
+        if self.coriolis.size:
+            self.values |= parts(self.coriolis, self.qd)
+            self.right |= parts(literal.coriolis_matrix(self.tree, self.q, self.qd), self.qd)
+            self.right[PRODUCT] = self.mujoco.bias(self.q, self.qd) - self.mujoco.gravity_balance(self.q)
+        self.tolerances, self.compared = dict[str, ndarray](), dict[str, Compared]()
+        for name, right in self.right.items():
+            rounding = FACTOR * EPS * np.broadcast_to(self.scale(name, right), right.shape)
+            self.tolerances[name] = rounding + self.rtol * np.abs(right).max(axis=0)
+            own, allowed = self.own(name), (rounding, self.tolerances[name])
+            values = own(self.values[name]), own(right), *(np.abs(own(part)) for part in allowed)
+            self.compared[name] = Compared(*values)
 
-    @cached_property
-    def roundings(self) -> dict[str, np.ndarray]:
-        """64 eps x scale of each quantity, in the model's joints."""
-        right = self.right
-        return {
-            name: FACTOR * EPS * np.broadcast_to(self.scale(name, right[name]), right[name].shape)
-            for name in right
-        }
-
-    @cached_property
-    def tolerances(self) -> dict[str, np.ndarray]:
-        """The same and rtol x the largest value that the entry has at these states."""
-        return {
-            name: self.roundings[name] + self.rtol * np.abs(right).max(axis=0)
-            for name, right in self.right.items()
-        }
-
-    @cached_property
-    def compared(self) -> dict[str, Compared]:
-        """Each quantity of the user and of MuJoCo."""
-        compared = {}
-        for name, yours in self.values.items():
-            own = self.own(name)
-            allowed = (np.abs(own(part[name])) for part in (self.roundings, self.tolerances))
-            compared[name] = Compared(own(yours), own(self.right[name]), *allowed)
-        return compared
-
-    def own(self, name: str) -> Callable[[np.ndarray], np.ndarray]:
+    def own(self, name: str) -> Callable[[ndarray], ndarray]:
         """Takes a quantity to the user's joints."""
         return self.joints.own_mass_matrix if len(COMPARED[name].shape) == 2 else self.joints.own_forces
 
-    def scale(self, name: str, right: np.ndarray) -> np.ndarray:
+    def scale(self, name: str, right: ndarray) -> ndarray:
         """The scale of each entry of a quantity, in the model's joints. right: MuJoCo's values."""
         scale = Entries(self.tree, self.q, self.qd)
+        if name in OF_CORIOLIS:  # the product is a difference from the weight
+            C = scale.coriolis_matrix
+            of_product = np.einsum("sij,sj->si", C, np.abs(self.qd)) + scale.weight
+            return of_product if name == PRODUCT else 2.0 * C
+        if name != "acceleration":
+            return {"mass_matrix": scale.mass_matrix, "bias": scale.bias, "gravity": scale.weight}[name]
         try:
-            if name == "acceleration":
-                return scale.acceleration(scale.force(self.tau), right)
+            return scale.acceleration(scale.force(self.tau), right)
         except np.linalg.LinAlgError:
             text = "Mbar of the model is singular at a state: there is no acceleration to compare"
             raise ValueError(text) from None
-        if name in OF_CORIOLIS:
-            return scales_of_parts(scale)[name]
-        return {"mass_matrix": scale.mass_matrix, "bias": scale.bias, "gravity": scale.weight}[name]
 
     def entries(self, name: str) -> dict[tuple[int, ...], str]:
         """The names of the entries of a quantity, by their place."""
         names = [self.coordinates.speeds[i] for i in self.joints.v]
         places = product(range(len(names)), repeat=len(COMPARED[name].shape))
         return {place: SYMBOLS[name] + "".join(f"[{names[i]}]" for i in place) for place in places}
+
+    @cached_property
+    def states(self) -> list[State]:
+        """The states, in the user's joints."""
+        joints = self.joints
+        own = joints.own_positions(self.q), joints.own_speeds(self.qd), joints.own_forces(self.tau)
+        return [State(i, *map(tuple, state)) for i, state in enumerate(zip(*(part.tolist() for part in own)))]
 
     @property
     def compensated(self) -> tuple[str, ...]:
@@ -247,7 +269,12 @@ class Comparison:
         return any(compared.fails for compared in self.compared.values())
 
 
-def rows_given(name: str, values: Any, shape: tuple[int | str, int]) -> np.ndarray:
+def parts(C: ndarray, qd: ndarray) -> dict[str, ndarray]:
+    """What is compared of C (states, nv, nv) at speeds qd (states, nv)."""
+    return {PRODUCT: np.einsum("sij,sj->si", C, qd), SYMMETRIC: C + C.swapaxes(1, 2)}
+
+
+def rows_given(name: str, values: Any, shape: tuple[int | str, int]) -> ndarray:
     """States as rows, (states, n), in this shape; a number is used for all. ValueError for anything else."""
     count, size = shape
     array = numbers_of(values)

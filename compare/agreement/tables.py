@@ -9,9 +9,7 @@ from numpy import ndarray
 from ..core.finding import Finding
 from ..engines.own import QUANTITIES
 from ..judge.scale import EPS
-from .comparison import Comparison
-from .coriolis import OF_CORIOLIS
-from .records import Compared
+from .comparison import OF_CORIOLIS, Compared, Comparison
 
 FEW = 0.15  # of the rows, at most
 LEAST_ROWS = 8

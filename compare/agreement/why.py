@@ -19,14 +19,16 @@ from ..diagnosis.forces import LeftOver
 from ..diagnosis.layout import ROUNDED
 from ..diagnosis.regression import through_noise
 from ..engines.own import QUICK, OwnEquations
+from ..judge.entries import Entries
 from ..robots.coordinates import Coordinates
-from .affine import CONSTANT, Affine
-from .comparison import Comparison
-from .coriolis import OF_CORIOLIS
+from .comparison import OF_CORIOLIS, Comparison
 from .tables import slips_of_tables
 
 SECONDS_OF_CAUSE = 4.5  # of a search
 SECONDS_OF_SLOPES = 1.5  # of accelerations at several torques
+LARGER = 8.0  # times the scale: a slope is a difference of two accelerations
+CONSTANT = 1e-8  # of a factor at all states
+SINGULAR = 1e8  # the condition of a matrix that is not inverted
 
 
 class Why(NamedTuple):
@@ -47,23 +49,19 @@ class Given(NamedTuple):
     values: Values  # Mbar and h; NaN where they are not given
     tau: ndarray  # (states, nv)
     qdd: ndarray | None  # (states, nv) accelerations to explain
-    stated: Stated | None
+    stated: Stated | None = None
+    equations: OwnEquations | None = None  # of the user
     rounding: float = ROUNDED  # of the scale of an entry
     bias: Callable[[ndarray], ndarray] | None = None  # of other speeds, where there is such a function
     mass_matrix: Callable[[ndarray], ndarray] | None = None  # of other positions
-    equations: OwnEquations | None = None  # of the user
 
-    @classmethod
-    def of(
-        cls, tree: Tree, values: Values, tau: ndarray, qdd: ndarray | None, stated: Stated,
-        equations: OwnEquations | None, rounding: float = ROUNDED,
-    ) -> "Given":  # fmt: skip
-        """A user's values; the functions that there are and that are quick are asked for more of them."""
-        is_quick = equations is not None and equations.seconds <= QUICK and equations.has("bias")
-        bias = partial(equations.bias, values.q) if equations is not None and is_quick else None
-        has_matrix = equations is not None and is_quick and equations.has("mass_matrix")
-        mass_matrix = equations.mass_matrix if equations is not None and has_matrix else None
-        return cls(tree, values, tau, qdd, stated, rounding, bias, mass_matrix, equations)
+    def with_functions(self) -> "Given":
+        """The same with the user's functions that are quick, which are asked for more values."""
+        own = self.equations
+        if own is None or own.seconds > QUICK or not own.has("bias"):
+            return self
+        mass_matrix = own.mass_matrix if own.has("mass_matrix") else None
+        return self._replace(bias=partial(own.bias, self.values.q), mass_matrix=mass_matrix)
 
     @property
     def right(self) -> Values:
@@ -72,23 +70,21 @@ class Given(NamedTuple):
         M, h = literal.mass_matrix(tree, q), literal.bias(tree, q, qd)
         return Values.of(tree, q, qd, M, h, self.rounding)
 
-    def left_over(self, values: Values, tau: ndarray | None = None) -> LeftOver:
+    def left_over(self, values: Values, tau: ndarray) -> LeftOver:
         """The force that the accelerations leave over."""
         assert self.qdd is not None
-        return LeftOver(self.tree, values, self.tau if tau is None else tau, self.qdd, self.rounding)
+        return LeftOver(self.tree, values, tau, self.qdd, self.rounding)
 
 
 def why(given: Given) -> Why:
     """What explains values: of Mbar and h, and of accelerations beside them; of accelerations alone where these agree."""
     are_given = bool(np.isfinite(given.values.packed).any())
     found = of_equations(given) if are_given else Why("", False)
-    if given.qdd is None:
-        return found
-    if not found.diagnosis.differs:
+    if given.qdd is not None and not found.diagnosis.differs:
         return of_accelerations(given)
-    if not given.values.are_finite:
+    if given.qdd is None or not given.values.are_finite:
         return found
-    left_over = given.left_over(given.values)
+    left_over = given.left_over(given.values, given.tau)
     if left_over.ratio <= 1.0:
         return found._replace(force_ratio=left_over.ratio)
     text = left_over.sentence() or say(Finding("agreement", "another"))
@@ -98,14 +94,13 @@ def why(given: Given) -> Why:
 
 def of_equations(given: Given) -> Why:
     """What a diagnosis finds in values of Mbar and h."""
-    values = given.values
-    asked = SECONDS_OF_CAUSE, given.bias, given.stated, given.mass_matrix
-    diagnosis = diagnose(given.tree, values, *asked)
+    values, equations = given.values, given.equations
+    diagnosis = diagnose(given.tree, values, SECONDS_OF_CAUSE, given.bias, given.stated, given.mass_matrix)
     if not diagnosis.differs:
         return Why("", False, diagnosis)
     if not diagnosis.causes and is_single(values.packed):
         return Why(say(Finding("agreement", "single")), False, diagnosis)
-    equations, broken = given.equations, list[str]()
+    broken = list[str]()
     if equations and given.mass_matrix and values.are_finite and not diagnosis.causes:
         tested = conditions(given.mass_matrix, equations.bias, equations.coordinates, values.q, values.qd)
         broken = [condition.text for condition in tested if not condition.is_met]
@@ -124,35 +119,79 @@ def is_single(values: ndarray) -> bool:
 # accelerations whose Mbar and h are right, or not given
 
 
+class Affine(NamedTuple):
+    """A user's function qdd = A tau + a, in the model's joints: accelerations are affine in the torques."""
+
+    tree: Tree
+    equations: OwnEquations
+
+    def slopes(self, q: ndarray) -> ndarray:
+        """A, (states, nv, nv): of accelerations at rest."""
+        zero, size = np.zeros((len(q), self.equations.coordinates.nv)), 1.0 + Entries(self.tree, q).force()
+        still = self.equations.acceleration(q, zero, zero)
+        pushed = [self.equations.acceleration(q, zero, size * unit) for unit in np.eye(zero.shape[1])]
+        return np.stack(pushed, axis=2) / size[:, None, :] - still[:, :, None] / size[:, None, :]
+
+    def mass_matrix(self, q: ndarray) -> ndarray:
+        return np.linalg.inv(self.slopes(q))
+
+    def bias(self, q: ndarray, M: ndarray, qd: ndarray) -> ndarray:
+        """h of Mbar qdd = tau - D qd - k (q - rest) - h, with the damping and springs of the model."""
+        qdd = self.equations.acceleration(q, qd, 0.0 * qd)
+        passive = np.array(self.tree.damping) * qd + literal.spring_torque(self.tree, q)
+        return -np.einsum("sij,sj->si", M, qdd) - passive
+
+    def inputs(self, q: ndarray) -> ndarray:
+        """What each torque (column) does at each joint (row), (nv, nv), if the mass matrix is right; else 1."""
+        acting = literal.mass_matrix(self.tree, q) @ self.slopes(q)
+        factors = acting.mean(axis=0)
+        off = np.abs(acting - factors).max()
+        return factors if off <= CONSTANT * (1.0 + np.abs(acting).max()) else np.eye(len(factors))
+
+    def values(self, q: ndarray, qd: ndarray, rounding: float) -> Values | None:
+        """The mass matrix and the bias; None where there is no such matrix."""
+        slopes = self.slopes(q)
+        if not np.isfinite(slopes).all() or (np.linalg.cond(slopes) > SINGULAR).any():
+            return None
+        M, scale = np.linalg.inv(slopes), Entries(self.tree, q, qd)
+        force = scale.force()
+        qdd = self.equations.acceleration(q, qd, 0.0 * qd)
+        still = scale.acceleration(force, qdd)
+        of_slopes = still[:, :, None] / (1.0 + force)[:, None, :] + np.abs(slopes)
+        allowed = LARGER * rounding * np.abs(M) @ of_slopes @ np.abs(M)
+        of_h = np.einsum("sij,sj->si", np.abs(M), still) + force
+        of_h = np.einsum("sij,sj->si", allowed, np.abs(qdd)) + LARGER * rounding * of_h
+        return Values(q, qd, M, self.bias(q, M, qd), (allowed, of_h))
+
+
 def of_accelerations(given: Given) -> Why:
     """What explains accelerations alone: a force, how they are solved for, or the bias if Mbar is right."""
     right, equations = given.right, given.equations
-    left_over = given.left_over(right)
+    left_over = given.left_over(right, given.tau)
     ratio = left_over.ratio
     if ratio <= 1.0:
         return Why("", False, force_ratio=ratio)
     if left_over.causes:
         return of_force(left_over.sentence(), left_over.causes, ratio)
+    q, are_given = right.q, given.values.are_finite
     solved = of_force(say(Finding("agreement", "solved")), (), ratio)
-    q, qd, are_given = right.q, right.qd, given.values.are_finite
     is_asked = equations is not None and equations.has("acceleration")
     if not is_asked or equations is None or equations.seconds * len(q) * (len(q[0]) + 1) > SECONDS_OF_SLOPES:
         return solved if are_given else of_needed_forces(given, left_over)
     affine = Affine(given.tree, equations)
     inputs, by_inputs = affine.inputs(q), None
-    if inputs is not None and (np.abs(inputs - np.eye(len(inputs))) > CONSTANT).any():
-        with_inputs = given.left_over(right, given.tau @ inputs.T)
-        by_inputs = of_inputs(equations.coordinates.speeds, inputs, with_inputs, ratio)
+    if (np.abs(inputs - np.eye(len(inputs))) > CONSTANT).any():
+        by_inputs = of_inputs(inputs, given.left_over(right, given.tau @ inputs.T), ratio)
         if by_inputs.is_found or are_given:
             return by_inputs
     if are_given:
         return solved
-    values = affine.values(q, qd, given.rounding)
+    values = affine.values(q, right.qd, given.rounding)
     if values is None:
         return by_inputs or of_needed_forces(given, left_over)
-    bias = partial(affine.bias, q, values.mass_matrix)
     asked = partial(diagnose, given.tree, values, SECONDS_OF_CAUSE, with_forces=True)
     if equations.seconds <= QUICK:
+        bias = partial(affine.bias, q, values.mass_matrix)
         asked = partial(asked, bias=bias, stated=given.stated, mass_matrix=affine.mass_matrix)
     diagnosis = asked()
     if by_inputs and not diagnosis.causes:
@@ -164,22 +203,19 @@ def of_force(text: str, causes: tuple[Cause, ...], ratio: float) -> Why:
     return Why(text, bool(causes), forces=causes, force_text=text, force_ratio=ratio)
 
 
-def of_inputs(names: tuple[str, ...], factors: ndarray, left_over: LeftOver, ratio: float) -> Why:
+def of_inputs(factors: ndarray, left_over: LeftOver, ratio: float) -> Why:
     """Torques that act with other factors or elsewhere, and what else acts; left_over: with these factors."""
+    names = Coordinates(left_over.tree.joint_names, left_over.tree.kind).speeds
     off = np.argwhere(np.abs(factors - np.eye(len(names))) > CONSTANT).tolist()
     wrong = [(names[j], names[i] if i != j else "", float(factors[i, j])) for i, j in off]
     text = f"{say(Finding('agreement', 'inputs', {'factors': wrong}))} {left_over.sentence()}".strip()
-    places = [f"tau of {name}{f' at {at}' * bool(at)}" for name, at, _ in wrong]
-    stated, explains = (
-        ", ".join(map("{:.7g}".format, x)) for x in zip(*((float(not at), x) for _, at, x in wrong))
-    )
     cause = Cause(
-        rank=2, kind="input", place=" and ".join(places), stated=stated, explains=explains, unit="times",
-        text=text.removesuffix("."),
+        rank=2, kind="input", unit="times", text=text.removesuffix("."),
+        place=" and ".join(f"tau of {name}{f' at {at}' * bool(at)}" for name, at, _ in wrong),
+        stated=", ".join("0" if at else "1" for _, at, _ in wrong),
+        explains=", ".join(f"{factor:.7g}" for *_, factor in wrong),
     )  # fmt: skip
-    return Why(
-        text, left_over.ratio <= 1.0 or bool(left_over.causes), Diagnosis(False), (cause,), text, ratio
-    )
+    return of_force(text, (cause,), ratio)._replace(is_found=left_over.ratio <= 1.0 or bool(left_over.causes))
 
 
 def of_needed_forces(given: Given, left_over: LeftOver) -> Why:
@@ -198,27 +234,27 @@ def of_needed_forces(given: Given, left_over: LeftOver) -> Why:
 
 def cause_of(comparison: Comparison) -> Why:
     """The probable cause of what differs: slips of a table, else of its equations, else one number beside noise."""
-    failing = [name for name, compared in comparison.compared.items() if compared.fails]
-    if OF_CORIOLIS.keys() >= {*failing}:
-        return of_coriolis(comparison, failing)
+    every = [name for name, compared in comparison.compared.items() if compared.fails]
+    failing = [name for name in every if name not in OF_CORIOLIS]
+    if not failing:
+        return of_coriolis(comparison, every)
     if slips := slips_of_tables(comparison):
         return Why(" ".join(map(say, slips)))
     which = some_states(comparison)
     if len(which) < min(LEAST_STATES, len(comparison.q)):
         return Why("", False)  # too few of them are numbers
-    failing = [name for name in failing if name not in OF_CORIOLIS]
     yours, tolerances = ({name: part[which] for name, part in parts.items()}
                          for parts in (comparison.values, comparison.tolerances))  # fmt: skip
     is_gravity = "bias" not in yours or ("gravity" in failing and "bias" not in failing)
     of_h = "gravity" if "gravity" in yours and is_gravity else "bias"
-    q, tau = comparison.q[which], comparison.tau[which]
     qd = comparison.qd[which] * (of_h == "bias" or failing == ["acceleration"])
-    values = Values.of(comparison.tree, q, qd, yours.get("mass_matrix"), yours.get(of_h), comparison.rounding)
-    of_M = tolerances.get("mass_matrix", values.tolerances[0])
-    values = values._replace(tolerances=(of_M, tolerances.get(of_h, values.tolerances[1])))
+    given = yours.get("mass_matrix"), yours.get(of_h)
+    values = Values.of(comparison.tree, comparison.q[which], qd, *given, comparison.rounding)
+    allowed = (tolerances.get(name, part) for name, part in zip(("mass_matrix", of_h), values.tolerances))
+    values = values._replace(tolerances=tuple(allowed))
     qdd = yours["acceleration"] if "acceleration" in failing else None
-    about = tau, qdd, Stated(comparison.joints), comparison.equations, comparison.rounding
-    found = why(Given.of(comparison.tree, values, *about))
+    about = qdd, Stated(comparison.joints), comparison.equations, comparison.rounding
+    found = why(Given(comparison.tree, values, comparison.tau[which], *about).with_functions())
     name = "acceleration" if failing == ["acceleration"] else of_h
     return found if found.is_found else of_noise(comparison, name) or found
 

@@ -88,11 +88,8 @@ class LeftOver:
             if term.any():
                 yield option(nothing, place, stated, explains, factors[explains] * term)
         if self.springs.any():
-            slack = (
-                np.array(self.tree.stiffness)[self.of_speed]
-                * self.values.q[:, self.tree.coordinates.first_positions]
-            )
-            place = "springs in the acceleration"
+            place, q = "springs in the acceleration", self.values.q[:, self.tree.coordinates.first_positions]
+            slack = np.array(self.tree.stiffness)[self.of_speed] * q
             yield option(nothing, place, "- k (q - rest)", "at rest at zero", slack - self.springs)
         h, M = self.values.bias, self.values.mass_matrix
         for inside, force in {"(tau - D qd)": h, "tau": h + self.damping + self.springs}.items():

@@ -35,30 +35,25 @@ class Given:
         qdd: ndarray | None = None, with_forces: bool = False,
     ):  # fmt: skip
         self.tree, self.values, self.bias, self.mass_matrix = tree, values, bias, mass_matrix
-        M, h, nv = values.mass_matrix, values.bias, len(tree.axis)
+        M, h, (of_M, of_h) = values.mass_matrix, values.bias, values.tolerances
         if rest is None and bias is not None and values.qd.any() and np.isfinite(h).all():
             rest = np.asarray(bias(np.zeros_like(values.qd)))
         self.rest = rest if rest is not None and np.isfinite(rest).all() else None
         skew = np.abs(M - np.swapaxes(M, 1, 2))
-        is_symmetric = not (skew > 2.0 * values.tolerances[0] + ROUNDED * np.abs(M)).any()
-        self.layout = Layout(nv, self.rest is not None, is_symmetric, qdd, with_forces)
+        is_symmetric = not (skew > 2.0 * of_M + ROUNDED * np.abs(M)).any()
+        self.layout = Layout(len(tree.axis), self.rest is not None, is_symmetric, qdd, with_forces)
         self.equations = Equations(tree, values.q, values.qd, self.layout)
-        at_rest = np.zeros_like(h) if self.rest is None else self.rest
-        of_M, of_h = values.tolerances
         if qdd is not None:  # h are the forces of these accelerations
             self.packed, self.tolerance = h, of_h
             return
+        at_rest, of_rest = (0.0 * h, 0.0 * of_h) if self.rest is None else (self.rest, of_h)
         self.packed = self.layout.packed(M, h - at_rest, at_rest)
-        rounded = self.layout.packed(of_M, of_h, of_h if self.rest is not None else 0.0 * of_h)
-        self.tolerance = np.where(rounded > 0.0, np.fmax(rounded, ROUNDED * self.own_scale), 0.0)
-
-    @property
-    def own_scale(self) -> ndarray:
-        """The size of each entry at a state, by its largest value at all: large values are rounded too."""
-        speed = 1.0 + np.abs(self.values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
-        of_state, start = np.ones_like(self.packed), self.layout.in_h.start
-        of_state[:, start : start + self.layout.nv] = speed
-        return np.nanmax(np.abs(self.packed) / of_state, axis=0, initial=0.0) * of_state
+        rounded = self.layout.packed(of_M, of_h, of_rest)
+        # large values are rounded too: the size of each entry at a state, by its largest value at all
+        of_state, part = np.ones_like(self.packed), list(self.layout.parts.values())[1]
+        of_state[:, part] = 1.0 + np.abs(values.qd).max(axis=1, keepdims=True, initial=0.0) ** 2
+        own_scale = np.nanmax(np.abs(self.packed) / of_state, axis=0, initial=0.0) * of_state
+        self.tolerance = np.where(rounded > 0.0, np.fmax(rounded, ROUNDED * own_scale), 0.0)
 
     @cached_property
     def h_follows_from_M(self) -> bool:
@@ -83,30 +78,26 @@ class Given:
 
     def details(self) -> tuple[Detail, ...]:
         """Entries of Mbar, gravity and coefficients of h that differ, where they are furthest apart."""
-        equations, details = self.equations, []
-        right, of_M = equations.coefficients, equations.entries[equations.in_M]
-        tolerances = dict.fromkeys(right, SUMMED * self.tolerance[:, equations.in_h].max(axis=1))
-        tolerances |= dict(zip(of_M, self.tolerance.T))
-        for entry, yours in (dict(zip(of_M, self.packed.T)) | self.coefficients_of_h).items():
-            off = np.abs(yours - right[entry])
-            if np.isfinite(yours).all() and (off > tolerances[entry]).any():
+        equations, bias, qd, details = self.equations, self.bias, self.values.qd, []
+        own = dict(zip(equations.entries[equations.in_M], self.packed.T))
+        of_h = SUMMED * self.tolerance[:, equations.in_h].max(axis=1)
+        tolerances = dict(zip(own, self.tolerance.T))
+        if not qd.any():
+            own |= {Entry("gravity", (i,)): column for i, column in enumerate(self.values.bias.T)}
+        elif bias is not None and equations.nv <= MOST_SPEEDS:
+            still = np.zeros_like(qd)
+            own |= coefficients_of(lambda speeds: np.stack([bias(x + still) for x in speeds]), equations.nv)
+        for entry, yours in own.items():
+            right, tolerance = equations.coefficients[entry], tolerances.get(entry, of_h)
+            off = np.abs(yours - right)
+            if np.isfinite(yours).all() and (off > tolerance).any():
                 k = int(np.argmax(off))
                 positions = zip(equations.coordinates.positions[:MOST_POSITIONS], equations.q[k])
                 at = tuple(f"{name} = {value:.6g}" for name, value in positions)
-                numbers = (x if abs(x) > tolerances[entry][k] else 0.0 for x in (yours[k], right[entry][k]))
-                your_number, right_number = numbers
-                details.append(Detail(entry.named(equations.speeds), your_number, right_number, at))
+                least, name = tolerance[k], entry.named(equations.speeds)
+                own_number, right_number = (float(x[k]) if abs(x[k]) > least else 0.0 for x in (yours, right))
+                details.append(Detail(name, own_number, right_number, at))
         return tuple(details)
-
-    @property
-    def coefficients_of_h(self) -> dict[Entry, ndarray]:
-        """The given coefficients of h, (states,) each, as far as they are known."""
-        bias, nv, qd = self.bias, self.equations.nv, self.values.qd
-        if not qd.any():
-            return {Entry("gravity", (i,)): column for i, column in enumerate(self.values.bias.T)}
-        if bias is None or nv > MOST_SPEEDS:
-            return {}
-        return coefficients_of(lambda speeds: np.stack([bias(speed + 0.0 * qd) for speed in speeds]), nv)
 
 
 # how joints are to be stated in the convention of a cause
@@ -119,41 +110,42 @@ class Stated(NamedTuple):
     by: Literal["argument", "option"] = "argument"  # joints=[...] of assert_agrees, or --joints
 
 
-class Statements(NamedTuple):
-    """The statements of causes. stated: the joints as stated, which may be wrong; None: they cannot be."""
+def causes_of(fits: Iterable[Fitted], coordinates: Coordinates, stated: Stated | None) -> Iterator[Cause]:
+    """The fits as causes; of conventions and zeros of joints with the joints to state.
 
-    coordinates: Coordinates
-    stated: Stated | None
+    stated: the joints as stated, which may be wrong; None: they cannot be.
+    """
+    for fit in fits:
+        cause, joints = fit.cause, fit.hypotheses[0].joints
+        if all(part.kind == OF_ZERO for part in cause.parts or (cause,)):
+            joints = with_zeros(fit, coordinates)
+        yield from restated(cause, joints, coordinates, stated)
 
-    def causes(self, fits: Iterable[Fitted]) -> Iterator[Cause]:
-        """The fits as causes; of conventions and zeros of joints with the joints to state."""
-        for fit in fits:
-            cause, joints = fit.cause, fit.hypotheses[0].joints
-            if all(part.kind == OF_ZERO for part in cause.parts or (cause,)):
-                joints = self.with_zeros(fit)
-            yield from self.restated(cause, joints)
 
-    def with_zeros(self, fit: Fitted) -> JointMap:
-        """Joints with the zeros of a fit."""
-        changes = zip(fit.hypotheses, fit.changes)
-        zeros = {one.cause.place: one.value(change) - float(one.cause.stated) for one, change in changes}
-        joints, kinds = [], self.coordinates.all_kinds
-        for name, kind in zip(self.coordinates.names, kinds):
-            zero = within_a_turn(zeros.get(f"zero of {name}", 0.0), kind == "slide")
-            joints.append(Joint(name, zero=float(f"{zero:.12g}"), slides=kind == "slide"))
-        return JointMap(self.coordinates, joints)
+def with_zeros(fit: Fitted, coordinates: Coordinates) -> JointMap:
+    """Joints with the zeros of a fit."""
+    changes = zip(fit.hypotheses, fit.changes)
+    zeros = {one.cause.place: one.value(change) - float(one.cause.stated) for one, change in changes}
+    joints = []
+    for name, kind in zip(coordinates.names, coordinates.all_kinds):
+        zero = within_a_turn(zeros.get(f"zero of {name}", 0.0), kind == "slide")
+        joints.append(Joint(name, zero=float(f"{zero:.12g}"), slides=kind == "slide"))
+    return JointMap(coordinates, joints)
 
-    def restated(self, cause: Cause, convention: JointMap | None) -> list[Cause]:
-        """A cause with how joints are to be stated in its convention; [] if that cannot be."""
-        if self.stated is None or convention is None:
-            return [cause]
-        wrong, by = self.stated
-        joints = convention if wrong.is_same else wrong.after(convention, self.coordinates)
-        if joints is None:
-            return []
-        if joints.is_same and not wrong.is_same and not cause.parts:
-            stated = ", ".join(map(str, wrong.joints))
-            part = Cause(rank=1, kind="order", place="joints", stated=stated, explains="those of the model")
-            cause = replace(cause, parts=(part,))
-        names = list(map(str, joints.joints))
-        return [replace(cause, joints=f"--joints={','.join(names)}" if by == "option" else f"joints={names}")]
+
+def restated(
+    cause: Cause, convention: JointMap | None, coordinates: Coordinates, stated: Stated | None
+) -> list[Cause]:
+    """A cause with how joints are to be stated in its convention; [] if that cannot be."""
+    if stated is None or convention is None:
+        return [cause]
+    wrong, by = stated
+    joints = convention if wrong.is_same else wrong.after(convention, coordinates)
+    if joints is None:
+        return []
+    if joints.is_same and not wrong.is_same and not cause.parts:
+        names = ", ".join(map(str, wrong.joints))
+        part = Cause(rank=1, kind="order", place="joints", stated=names, explains="those of the model")
+        cause = replace(cause, parts=(part,))
+    own = list(map(str, joints.joints))
+    return [replace(cause, joints=f"--joints={','.join(own)}" if by == "option" else f"joints={own}")]

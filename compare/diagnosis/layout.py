@@ -1,6 +1,7 @@
 """What stands in a row of values: the entries of Mbar and h, their names, tolerances, and coefficients of speeds."""
 
 from collections.abc import Callable, Sequence
+from itertools import combinations_with_replacement
 from typing import NamedTuple
 
 import numpy as np
@@ -49,12 +50,9 @@ class Layout(NamedTuple):
     @property
     def places(self) -> tuple[ndarray, ndarray]:
         """The rows and columns of the entries of Mbar."""
-        if self.qdd is not None:
-            return np.zeros(0, int), np.zeros(0, int)
-        if self.is_symmetric:
-            return np.tril_indices(self.nv)
-        i, j = np.indices((self.nv, self.nv))
-        return i.ravel(), j.ravel()
+        of_M = np.ones((self.nv, self.nv)) * (self.qdd is None)
+        i, j = np.nonzero(np.tril(of_M) if self.is_symmetric else of_M)
+        return i, j
 
     @property
     def parts(self) -> dict[str, slice]:
@@ -77,13 +75,12 @@ class Layout(NamedTuple):
         if self.qdd is not None:  # of as many states as there are, or of all several times
             qdd = np.resize(self.qdd, np.shape(velocity_terms)[-2:])
             return np.einsum("...ij,...j->...i", mass_matrix, qdd) + velocity_terms + rest
-        i, j = self.places
         of_h = [velocity_terms, rest] if self.is_split else [velocity_terms + rest]
-        return np.concatenate([np.asarray(mass_matrix)[..., i, j], *of_h], axis=-1)
+        return np.concatenate([np.asarray(mass_matrix)[..., *self.places], *of_h], axis=-1)
 
-    def of_row(self, i: int) -> list[int]:
-        """The entries of a row of h."""
-        return [self.parts[name].start + i for name in list(self.parts)[1:]]
+    def of_rows(self, rows: Sequence[int]) -> list[int]:
+        """The entries of rows of h."""
+        return [part.start + i for i in rows for part in list(self.parts.values())[1:]]
 
 
 def packed(mass_matrix: ndarray, bias: ndarray) -> ndarray:
@@ -130,14 +127,13 @@ def coefficients_of(bias: Callable[[ndarray], ndarray], nv: int) -> dict[Entry, 
 
     bias: speeds (n, nv) -> h (n, states, nv), of which the part that is even in the speeds is taken.
     """
-    unit, even = np.eye(nv), {}
-    pairs = [(j, k) for j in range(nv) for k in range(j, nv)] if nv <= MOST_SPEEDS else []
-    speeds = [unit[j] + (j != k) * unit[k] for j, k in pairs]
-    rest, *values = bias(np.array([0.0 * unit[0], *speeds, *(-speed for speed in speeds)]))
-    for pair, forward, back in zip(pairs, values, values[len(pairs) :]):
-        even[pair] = (forward + back) / 2.0 - rest
-    mixed = {(j, k): values - even[j, j] - even[k, k] for (j, k), values in even.items() if j != k}
+    pairs = list(combinations_with_replacement(range(nv), 2)) if nv <= MOST_SPEEDS else []
+    speeds = np.array([(np.eye(nv)[j] + np.eye(nv)[k]) / (1.0 + (j == k)) for j, k in pairs]).reshape(-1, nv)
+    rest, *values = bias(np.concatenate([np.zeros((1, nv)), speeds, -speeds]))
+    moved = zip(pairs, values, values[len(pairs) :])
+    even = {pair: (forward + back) / 2.0 - rest for pair, forward, back in moved}
     found = {Entry("gravity", (i,)): rest[:, i] for i in range(nv)}
-    for pair, values in (even | mixed).items():
-        found |= {Entry("velocity", (i, *pair)): values[:, i] for i in range(nv)}
+    for (j, k), both in even.items():
+        own = both if j == k else both - even[j, j] - even[k, k]
+        found |= {Entry("velocity", (i, j, k)): own[:, i] for i in range(nv)}
     return found

@@ -90,9 +90,7 @@ class Equations:
     def axes_at(self, joint: int) -> ndarray:
         """The axes of the file's body that a joint moves, as columns; else of the body that it carries."""
         of_joints = dict(zip(self.tree.site_joint[::-1], self.tree.site_rotation[::-1]))
-        carried = (
-            k for k in range(joint, len(self.tree.parent)) if k in of_joints and joint in self.tree.path(k)
-        )
+        carried = (k for k in sorted(of_joints) if joint in self.tree.path(k))
         turn = of_joints.get(next(carried, -1)) if joint >= 0 else None
         return np.eye(3) if turn is None else whole(np.array(turn))
 
@@ -101,10 +99,8 @@ class Equations:
         """What each term of all bodies adds, (bodies, states, entries)."""
         count, I = len(self.q), self.stated["inertia"]
         T, B = (vectors([getattr(b, name) for b in self.bodies], count) for name in "TB")
-        a, alpha, w = (
-            vectors([[getattr(b, name) for b in self.bodies]], count)[0]
-            for name in ("v_conv", "w_conv", "omega")
-        )
+        motion = [[b.v_conv, b.w_conv, b.omega] for b in self.bodies]
+        a, alpha, w = vectors(motion, count).swapaxes(0, 1)
         zero, mass = np.zeros((len(I), count, self.nv)), self.stated["mass"][:, None, None]
         none = np.zeros((*zero.shape, self.nv))
         gyroscopic = np.cross(w, np.einsum("bij,bsj->bsi", I, w))
@@ -146,8 +142,7 @@ class Equations:
             q, qd = np.tile(self.q, (len(speeds), 1)), np.repeat(speeds, len(self.q), axis=0)
             return Equations(self.tree, q, qd).h.reshape(len(speeds), *self.qd.shape)
 
-        of_M = dict(zip(self.entries[self.in_M], self.right.T))
-        return of_M | coefficients_of(bias, self.nv)
+        return dict(zip(self.entries[self.in_M], self.right.T)) | coefficients_of(bias, self.nv)
 
     def values(self, changes: Changes) -> ndarray:
         """Mbar and h with numbers of the tree changed, (changes, states, entries); axes are normalized."""
@@ -182,11 +177,8 @@ class Equations:
         still = [b._replace(v_conv=ZERO, w_conv=ZERO, omega=ZERO) for b in bodies]
         flat = [*chain.from_iterable(M), *velocity_terms, *method.bias(still, gravity)]
         table, nv = np.stack(np.broadcast_arrays(*flat, np.zeros(len(self.q))), axis=-1)[..., :-1], self.nv
-        return (
-            table[..., : nv * nv].reshape(*table.shape[:-1], nv, nv),
-            table[..., nv * nv : -nv],
-            table[..., -nv:],
-        )
+        M_flat, of_velocity, of_gravity = np.split(table, [nv * nv, nv * nv + nv], axis=-1)
+        return M_flat.reshape(*table.shape[:-1], nv, nv), of_velocity, of_gravity
 
 
 def whole(numbers: ndarray) -> ndarray:

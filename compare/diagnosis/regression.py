@@ -27,7 +27,7 @@ from .model import Equations
 RANK = 1e-9  # of the largest singular value
 ZERO = 1e-5  # m, or m2: what is no length of a load
 SEVERAL, TURNED = 0.5, 0.2  # costs
-OF_BODY = ("mass", "com", "inertia")  # fields
+OF_BODY, VECTORS = ("mass", "com", "inertia"), ("com", "offset")  # fields
 
 
 def several(equations: Equations, family: Family, search: Search) -> Iterator[Cause]:
@@ -35,32 +35,23 @@ def several(equations: Equations, family: Family, search: Search) -> Iterator[Ca
     groups: dict[tuple[str, int], list[int]] = {}
     for k, one in enumerate(family.hypotheses):
         field, at = one.moves[0][0].field, one.moves[0][0].at
-        if len({(path.field, path.at[:1]) for path, _ in one.moves}) == 1:
-            if field in OF_BODY:
-                groups.setdefault(("body", at[0]), []).append(k)
-            if field in ("com", "offset"):
-                groups.setdefault((field, at[0]), []).append(k)
-            if field in ("mass", "armature"):
-                groups.setdefault((field, -1), []).append(k)
-    triples = [chosen for (field, _), chosen in groups.items() if field in ("com", "offset")]
-    sets = [tuple(family.hypotheses[k] for k in chosen) for chosen in triples]
+        keys = [("body", at[0])] * (field in OF_BODY) + [(field, at[0])] * (field in VECTORS)
+        keys += [(field, -1)] * (field in ("mass", "armature"))
+        for key in keys if len({(path.field, path.at[:1]) for path, _ in one.moves}) == 1 else ():
+            groups.setdefault(key, []).append(k)
+    vectors = [chosen for (field, _), chosen in groups.items() if field in VECTORS]
+    sets = [tuple(family.hypotheses[k] for k in chosen) for chosen in vectors]
     for fit in search.fitted(sets, np.zeros((len(sets), 3))):
         yield from as_cause(equations, fit.hypotheses, fit.changes) if fit.explains else ()
     for (field, owner), chosen in groups.items():
-        if field in ("com", "offset"):
-            continue
-        those = [family.hypotheses[k] for k in chosen]
-        added, determined = regressed(search, family.first[chosen])
-        tensor = [one.moves[0][0].field == "inertia" for one in those]
+        those, columns = [family.hypotheses[k] for k in chosen], family.first[chosen]
+        added, determined = regressed(search, columns) if field not in VECTORS else (0.0, np.zeros(1, bool))
         if field == "body":  # first with the mass and the CoM as stated
-            of_tensor, is_known = regressed(search, family.first[chosen][tensor])
+            of_tensor, is_known = regressed(search, columns[4:])
             if is_known.all():
-                added, determined = (
-                    np.append(np.zeros(len(those) - len(of_tensor)), of_tensor),
-                    np.ones(len(those), bool),
-                )
-        active = np.abs(family.first[chosen]).max(axis=(1, 2)) > 0.0
-        added = added * [one.size for one in those]
+                added, determined = np.append(np.zeros(4), of_tensor), np.ones(len(those), bool)
+        added = added * np.array([one.size for one in those])
+        active = np.abs(columns).max(axis=(1, 2)) > 0.0
         if field == "body" and determined[active].any():
             yield from of_body(equations, owner, those, added, determined, active)
         elif determined.any():
@@ -117,12 +108,9 @@ def of_body(
         is_body = not is_known or np.linalg.eigvalsh(tensor)[0] >= -ZERO * mass
         if is_body and all(map(is_round, (mass, *place))):
             where = ", ".join(f"{x:.5g}" for x in np.where(np.abs(place) < ZERO, 0.0, place))
-            shown = [
-                f", {name} {tensor[i, j]:.4g}" for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass
-            ]
-            explains = f"{mass:.5g} kg, CoM ({where}) m" + "".join(
-                [*shown, " kg m2"] if is_known and shown else []
-            )
+            moments = [(name, tensor[i, j]) for name, i, j in INERTIA if abs(tensor[i, j]) > ZERO * mass]
+            shown = [f", {name} {x:.4g}" for name, x in moments if is_known]
+            explains = f"{mass:.5g} kg, CoM ({where}) m{''.join(shown)}{' kg m2' * bool(shown)}"
             on = f"a load on {equations.tree.body_names[b]}"
             yield Cause(rank=3, kind="numbers", place=on, stated="", explains=explains, cost=SEVERAL)
             return
@@ -136,10 +124,8 @@ def of_body(
 
 def turned_of(equations: Equations, b: int, tensor: ndarray) -> Cause | None:
     """The tensor of a body about other axes, with the same principal moments: an inertial frame turned."""
-    axes = equations.frame_of(b).axes
-    (right, before), (moments, after) = (
-        np.linalg.eigh(axes.T @ I @ axes) for I in (equations.stated["inertia"][b], tensor)
-    )
+    axes, stated = equations.frame_of(b).axes, equations.stated["inertia"][b]
+    (right, before), (moments, after) = (np.linalg.eigh(axes.T @ I @ axes) for I in (stated, tensor))
     if np.abs(moments - right).max() > SMALL * right[-1] or np.diff(right).min() <= ZERO * right[-1]:
         return None
     before, after = (vectors * [np.linalg.det(vectors), 1.0, 1.0] for vectors in (before, after))
@@ -165,34 +151,32 @@ def as_cause(
     for one, x in zip(those, changes):
         size, unit = max(abs(float(one.cause.stated)), abs(one.value(x))), one.cause.unit
         sizes[unit] = max(sizes.get(unit, 0.0), size)
-    pairs = [
-        (one.cause, one.value(x)) for one, x in zip(those, changes) if abs(x) > SMALL * sizes[one.cause.unit]
-    ]
+    acting = [(one, x) for one, x in zip(those, changes) if abs(x) > SMALL * sizes[one.cause.unit]]
+    causes, values = [one.cause for one, _ in acting], [one.value(x) for one, x in acting]
+    right = [float(cause.stated) for cause in causes]
     are_possible = all(one.is_possible(x) for one, x in zip(those, changes))
-    if len(pairs) < 2 or not (are_possible and all(is_written(x, float(cause.stated)) for cause, x in pairs)):
+    if len(acting) < 2 or not (are_possible and all(map(is_written, values, right))):
         return
-    names = [cause.place.partition(" of ") for cause, _ in pairs]
+    names = [cause.place.partition(" of ") for cause in causes]
+    place = f"{names[0][0]} of {listed([owner for *_, owner in names])}"
     if len({owner for *_, owner in names}) == 1:
         place = f"{listed(merged([name for name, *_ in names]))} of {names[0][2]}"
-    else:
-        place = f"{names[0][0]} of {listed([owner for *_, owner in names])}"
-    units = {cause.unit for cause, _ in pairs}
-    each = [cause.unit * (len(units) > 1) for cause, _ in pairs]
-    explains = ", ".join(f"{x:.6g} {unit}".strip() for (_, x), unit in zip(pairs, each))
-    stated = ", ".join(f"{cause.stated:.6g} {unit}".strip() for (cause, _), unit in zip(pairs, each))
-    unit = units.pop() if len(units) == 1 else ""
-    cost = SEVERAL + float(np.mean([of_number(x, float(cause.stated), equations) for cause, x in pairs]))
-    about: dict[str, Any] = {"stated": stated, "explains": explains, "unit": unit, "cost": cost}
+    units = [cause.unit for cause in causes]
+    common = units[0] if len({*units}) == 1 else ""
+    stated, explains = (
+        ", ".join(f"{x:.6g} {'' if common else unit}".strip() for x, unit in zip(numbers, units))
+        for numbers in (right, values)
+    )
+    cost = SEVERAL + float(np.mean([of_number(*pair, equations) for pair in zip(values, right)]))
+    about: dict[str, Any] = {"stated": stated, "explains": explains, "unit": common, "cost": cost}
     yield Cause(rank=3, kind="several", place=place, **about)
 
 
 def merged(names: list[str]) -> list[str]:
     """Names that begin alike as one: "CoM x", "CoM z" as "CoM x", "z"."""
     firsts = [name.rpartition(" ")[0] for name in names]
-    pairs = zip(names, firsts, ["", *firsts])
-    return [
-        name.removeprefix(f"{first} ") if first and first == before else name for name, first, before in pairs
-    ]
+    alike = [first and first == before for first, before in zip(firsts, ["", *firsts])]
+    return [name.rpartition(" ")[2] if is_alike else name for name, is_alike in zip(names, alike)]
 
 
 # one number beside noise
@@ -216,9 +200,8 @@ class Noisy(NamedTuple):
     @property
     def digits(self) -> int:
         """Of the value, as many as its deviation leaves."""
-        return (
-            int(np.clip(np.ceil(np.log10(abs(self.value / self.deviation))) + 1, 2, 12)) if self.value else 1
-        )
+        digits = np.ceil(np.log10(abs(self.value / self.deviation))) + 1 if self.value else 1
+        return int(np.clip(digits, 1 + bool(self.value), 12))
 
 
 def through_noise(tree: Tree, values: Values, qdd: ndarray | None = None) -> Noisy | None:
@@ -226,39 +209,33 @@ def through_noise(tree: Tree, values: Values, qdd: ndarray | None = None) -> Noi
     given = Given(tree, values, None, qdd=qdd)
     equations = given.equations
     search = Search(equations.values, given.packed, given.tolerance)
-    places = [
-        *numbers(equations),
-        *terms(equations),
-        *coefficients(equations),
-        *squares_of_velocities(equations),
-    ]
-    family = search.expanded(places)
+    kinds = numbers, terms, coefficients, squares_of_velocities
+    family = search.expanded([one for kind in kinds for one in kind(equations)])
     first, second = family.first * search.weight, family.second * search.weight
     count, off = int(search.known.sum()), search.off
     of_values = given.packed if qdd is None else np.einsum("sij,sj->si", equations.parts[0], qdd)
     entries = search.known.any(axis=0) & search.right.any(axis=0)
+    size = np.linalg.norm(of_values[search.known])
     if count < LEAST_NUMBERS or not np.isfinite(off).all():
         return None
 
     def noise_of(left: ndarray) -> float | None:
         """The share of noise in the values, if all that is left is that: no place explains a part of it."""
-        sigma = np.linalg.norm(left) / np.sqrt(count)
         lengths = np.linalg.norm(first.reshape(len(first), -1), axis=1)
         part = np.abs(np.einsum("kse,se->k", first, left)) / np.where(lengths > 0.0, lengths, 1.0)
-        share = np.linalg.norm(left * search.tolerance) / np.linalg.norm(of_values[search.known])
-        is_everywhere = bool((np.abs(left)[:, entries] > 1.0).mean(axis=0).min(initial=1.0) > MOST_OFF)
-        is_white = bool((part <= WHITE * sigma).all())
-        return float(share) if is_everywhere and is_white and share <= MOST_NOISE else None
+        share = float(np.linalg.norm(left * search.tolerance) / size)
+        is_everywhere = (np.abs(left)[:, entries] > 1.0).mean(axis=0).min(initial=1.0) > MOST_OFF
+        is_white = (part <= WHITE * np.linalg.norm(left) / np.sqrt(count)).all()
+        return share if is_everywhere and is_white and share <= MOST_NOISE else None
 
     alone = noise_of(off)
     if alone is not None:
         return Noisy(alone)
     chosen = [k for k, one in enumerate(family.hypotheses) if one.cause.kind == "number" and one.is_quadratic]
-    fits = sorted((*nearest_change(first[k], second[k], off), k) for k in chosen)
-    for left_over, x, k in fits[:1]:
-        slope, place = first[k] + 2.0 * x * second[k], family.hypotheses[k]
-        noise = noise_of(off - x * first[k] - x * x * second[k])
-        deviation = left_over / np.sqrt(count - 1) / np.linalg.norm(slope)
-        if noise is not None and abs(x) > LARGE * deviation and place.is_possible(x * place.size):
-            return Noisy(noise, place.cause, place.value(x * place.size), float(deviation * place.size))
-    return None
+    left_over, x, k = min((*nearest_change(first[k], second[k], off), k) for k in chosen)
+    slope, place = first[k] + 2.0 * x * second[k], family.hypotheses[k]
+    noise = noise_of(off - x * first[k] - x * x * second[k])
+    deviation = left_over / np.sqrt(count - 1) / np.linalg.norm(slope)
+    if noise is None or abs(x) <= LARGE * deviation or not place.is_possible(x * place.size):
+        return None
+    return Noisy(noise, place.cause, place.value(x * place.size), float(deviation * place.size))

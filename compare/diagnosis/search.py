@@ -14,7 +14,7 @@ from tmt import Tree
 from ..core.cause import Cause
 from .cause import LEAST_STATES, Diagnosis, distinct, ranked, together
 from .fit import Family, Fitted, OutOfTime, Search, explaining
-from .given import Bias, Given, Stated, Statements
+from .given import Bias, Given, Stated, causes_of, restated
 from .hypothesis import NATURAL, OF_ZERO, Hypothesis, cost
 from .kinds.angles import linearized, orders_of_rotation, other_angles, sums_of_angles
 from .kinds.conventions import conventions
@@ -32,9 +32,7 @@ from .regression import several
 # states at which hypotheses are tried first: at least this number, and values for those of two numbers
 FEW, ENOUGH = 3, 40
 LARGE = 7e7  # times the tolerance of 64 eps: 1e-6 of the scale
-NEAREST = 0.05  # of the difference: what leaves more is not near
-NEAR = 2  # conventions with which another cause is sought, and single changes of which the nearest is told
-PARTIAL = 0.7  # of the difference: what such a convention leaves at most
+NEAR, PARTIAL = 2, 0.7  # conventions with which another cause is sought, and what they leave at most
 IN_PART, CONVENTION_IN_PART = 0.12, 0.32  # costs of a slip, of a convention in some parts alone
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
@@ -75,7 +73,7 @@ class Explanations:
 
     def __init__(self, given: Given, end: float, stated: Stated | None, seconds: float = inf):
         self.given, self.equations, self.seconds, self.end = given, given.equations, seconds, end
-        self.statements = Statements(given.equations.coordinates, stated)
+        self.joints = given.equations.coordinates, stated  # of the model, and as they are stated
         # a robot with springs has them in the forces that are compared
         self.at_rest = "the forces at rest" if given.tree.has_springs else "gravity"
         self.search = Search(self.equations.values, given.packed, given.tolerance, end)
@@ -90,14 +88,13 @@ class Explanations:
         self.is_finished = True
         self.families: dict[Kind, Family] = {}
         self.listed: dict[Kind, list[Hypothesis]] = {}
-        self.near: list[Fitted] = []  # single changes that leave little at a few states
 
     def diagnosis(self) -> Diagnosis:
         if not self.off.any():
             return Diagnosis(False)
         layout, known = self.equations.layout, self.search.known.any(axis=0)
         names = [entry.named(self.equations.speeds) for entry in self.equations.entries]
-        places = [[k] for k in range(layout.in_M.stop)] + [layout.of_row(i) for i in range(layout.nv)]
+        places = [[k] for k in range(layout.in_M.stop)] + [layout.of_rows([i]) for i in range(layout.nv)]
         found = Diagnosis(
             True, entries=tuple(name for name, at in zip(names, places) if self.off[at].any()),
             compared=sum(known[at].any() for at in places), parts=self.named(self.differing),
@@ -111,8 +108,7 @@ class Explanations:
         if causes:
             return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))), seconds=seconds)
         details = self.given.details() if layout.qdd is None else ()
-        closest = self.closest() if self.is_finished else None
-        return found._replace(closest=closest, details=details, seconds=seconds)
+        return found._replace(details=details, seconds=seconds)
 
     def named(self, parts: Sequence[str]) -> tuple[str, ...]:
         return tuple(self.at_rest if part == "gravity" else part for part in parts)
@@ -120,22 +116,15 @@ class Explanations:
     def cost(self, cause: Cause) -> float:
         return cost(cause, self.equations)
 
-    def closest(self) -> Cause | None:
-        """The single change that leaves least, if that is little."""
-        near = sorted(self.near, key=lambda fit: fit.left_over)
-        keys = [fit.hypotheses[0].key for fit in near if fit.hypotheses[0].cause.kind != "whole"][:NEAR]
-        every = [one for kind in FIRST if kind in self.families for one in self.hypotheses(kind)]
-        those = [one for one in every if one.key in keys]
-        fits = self.search.alone(self.search.expanded(those)) if those else []
-        closest = min(fits, key=lambda fit: fit.left_over, default=None)
-        return closest.cause if closest and closest.left_over < NEAREST and closest.is_possible else None
+    def said(self, fits: Iterable[Fitted]) -> Iterator[Cause]:
+        return causes_of(fits, *self.joints)
 
     def stages(self) -> Iterator[list[Cause]]:
         """Explanations of everything: the natural ones of each stage, if there are any; then the others.
 
         One number with many digits is simpler than two causes.
         """
-        unusual, said = list[Cause](), self.statements.causes
+        unusual, said = list[Cause](), self.said
         stages: tuple[Callable[[], Iterable[Cause]], ...] = (
             lambda: said(self.explained(FIRST)), lambda: said(self.explained(SLIPS)), self.of_parts,
             lambda: said(self.of_angles(self.search)), self.groups, self.two_causes,
@@ -174,7 +163,7 @@ class Explanations:
             every = {one.key: one for kind in kinds for one in self.hypotheses(kind)}
             sets = [tuple(every[one.key] for one in fit.hypotheses) for fit in fits]
             starts = np.array([fit.changes for fit in fits])
-            found = list(self.statements.causes(explaining(self.search.fitted(sets, starts)) if sets else ()))
+            found = list(self.said(explaining(self.search.fitted(sets, starts)) if sets else ()))
             yield from found
             if any(self.cost(cause) < NATURAL for cause in found):
                 break
@@ -223,8 +212,6 @@ class Explanations:
         for kind in kinds:
             fits = few.alone(self.family(kind), entries is None)
             near = [fit.hypotheses[0] for fit in fits if fit.ratio <= 1.0]
-            if entries is None:
-                self.near += (fit for fit in fits if fit.left_over < NEAREST and fit.hypotheses[0].is_open)
             if near:
                 those = every.expanded(self.at_all(kind, near))
                 yield from explaining(every.alone(those, entries is None))
@@ -262,7 +249,7 @@ class Explanations:
             where = IN_PARTS.get(tuple(said), "").format(rest=self.at_rest) if is_elsewhere else ""
             is_convention = one.convention is not None or one.cause.kind == "order"
             more = (CONVENTION_IN_PART if is_convention else IN_PART) * bool(where)
-            those = [fit.cause] if one.convention else self.statements.causes([fit])
+            those = [fit.cause] if one.convention else self.said([fit])
             causes += [replace(cause, place=cause.place + where, cost=cause.cost + more) for cause in those]
         return sorted((cause for cause in causes if self.cost(cause) < NATURAL), key=self.cost)
 
@@ -276,4 +263,4 @@ class Explanations:
                 continue
             causes = [fit.cause for fit in inner.explained((*COMPLETE, numbers, *FACTORS))]
             for cause in (cause for cause in causes if inner.cost(cause) < NATURAL):
-                yield from self.statements.restated(together([one.cause, cause], 0.0), one.joints)
+                yield from restated(together([one.cause, cause], 0.0), one.joints, *self.joints)

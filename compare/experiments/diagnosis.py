@@ -17,9 +17,8 @@ from ..core.rows import Row, column
 from ..core.text import block
 from ..diagnosis import STATES_ASKED, Stated, Values
 from ..diagnosis.consistency import Condition, conditions
-from ..diagnosis.layout import ROUNDED, packed
+from ..diagnosis.layout import packed
 from ..diagnosis.model import Equations
-from ..engines import Dynamics
 from ..engines.mujoco.reading import tree_with_sites
 from ..engines.own import OwnDynamics
 from ..judge.agree import share_of
@@ -104,36 +103,34 @@ def diagnosed(setup: Setup) -> Found:
     if setup.reading is not None and tree == setup.reading.tree:
         tree = tree_with_sites(setup.reading)  # its numbers are said in the frames of the file
     dynamics, (q, qd, tau) = setup.engines[engine].of(setup.robot.case()), (sample.q, sample.qd, sample.tau)
-    qdd = dynamics.acceleration(q, qd, tau)
-    if not isinstance(dynamics, OwnDynamics):
-        values = Values.of(tree, q, qd, dynamics.mass_matrix(q), dynamics.bias(q, qd))
-        functions = partial(dynamics.bias, q), dynamics.mass_matrix
-        given = Given(tree, values, tau, qdd, None, ROUNDED, *functions)
-        return Found(engine, len(q), why(given), ratio_of(values, given.right))
-    equations = dynamics.equations
-    has_matrix = dynamics.has("mass_matrix")
-    of_own = (dynamics.mass_matrix(q), dynamics.bias(q, qd)) if has_matrix else (None, None)
-    values = Values.of(tree, q, qd, *of_own)
-    given = Given.of(tree, values, tau, qdd, Stated(equations.joints, "option"), equations)
-    found = why(given)
+    own = dynamics if isinstance(dynamics, OwnDynamics) else None
+    has_matrix = own is None or own.has("mass_matrix")
+    of_engine = (dynamics.mass_matrix(q), dynamics.bias(q, qd)) if has_matrix else (None, None)
+    values, qdd = Values.of(tree, q, qd, *of_engine), dynamics.acceleration(q, qd, tau)
+    if own is None:
+        bias = partial(dynamics.bias, q)
+        given = Given(tree, values, tau, qdd, bias=bias, mass_matrix=dynamics.mass_matrix)
+    else:
+        stated = Stated(own.equations.joints, "option")
+        given = Given(tree, values, tau, qdd, stated, own.equations).with_functions()
+    found = Found(engine, len(q), why(given))
     if not has_matrix:
-        return Found(engine, len(q), found)
-    is_drawn = given.mass_matrix is not None and found.diagnosis.differs and not found.diagnosis.causes
-    curve = telling_curve(dynamics, tree, values, given.right) if is_drawn else None
-    tested = conditions_of(dynamics, values)
-    return Found(engine, len(q), found, ratio_of(values, given.right), tested, curve)
+        return found
+    shares = share_of(np.abs(values.packed - given.right.packed), values.packed_tolerance)
+    found = found._replace(ratio=float(shares.max()))
+    if own is None:
+        return found
+    is_drawn = (
+        given.mass_matrix is not None and found.why.diagnosis.differs and not found.why.diagnosis.causes
+    )
+    curve = telling_curve(own, tree, values, shares) if is_drawn else None
+    return found._replace(conditions=conditions_of(own, values), curve=curve)
 
 
-def ratio_of(values: Values, right: Values) -> float:
-    """Of a difference to its tolerance, the largest."""
-    return float(share_of(np.abs(values.packed - right.packed), values.packed_tolerance).max())
-
-
-def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Values) -> Curve:
+def telling_curve(dynamics: OwnDynamics, tree: tmt.Tree, values: Values, shares: np.ndarray) -> Curve:
     """The entry that differs most, and the coordinate along which its difference changes most."""
-    ratios = share_of(np.abs(values.packed - right.packed), values.packed_tolerance)
-    ratios = np.nan_to_num(ratios, posinf=0.0)
-    state, k = np.unravel_index(int(np.argmax(ratios)), ratios.shape)
+    shares = np.nan_to_num(shares, posinf=0.0)
+    state, k = np.unravel_index(int(np.argmax(shares)), shares.shape)
     equations, qd = Equations(tree, values.q, values.qd), np.tile(values.qd[state], (POINTS, 1))
     coordinates, entry, curves = equations.coordinates, equations.entries[k].named(equations.speeds), []
     for name, unit, direction in zip(coordinates.speeds, coordinates.units, np.eye(equations.nv)):
@@ -144,9 +141,9 @@ def telling_curve(dynamics: Dynamics, tree: tmt.Tree, values: Values, right: Val
     return max(curves, key=lambda curve: np.nan_to_num(np.ptp(curve.yours - curve.right)))
 
 
-def conditions_of(dynamics: Dynamics, values: Values) -> list[Condition] | None:
+def conditions_of(dynamics: OwnDynamics, values: Values) -> list[Condition] | None:
     """The conditions on a user's own Mbar and h at as many states as there is time for; None: at none."""
-    if not isinstance(dynamics, OwnDynamics) or not values.are_finite:
+    if not values.are_finite:
         return []
     q, qd = values.q, values.qd
     calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * dynamics.coordinates.nv

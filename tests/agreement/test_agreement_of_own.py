@@ -95,6 +95,11 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
     assert f"{name}: mismatched entries 1 / " in message_of(**{name: changed}, **states, rtol=rtol)
 
 
+def at_height(z):
+    aloft = PENDULUM.replace("<worldbody>", f'<worldbody><body pos="0 0 {z}">')
+    return aloft.replace("</worldbody>", "</body></worldbody>")
+
+
 def advised(mjcf=PENDULUM, **brought):
     _, found, rtol = message_of(mjcf, **brought).partition("state rtol=")
     return float(rtol.split()[0].rstrip(".")) if found else None
@@ -130,13 +135,10 @@ def test_a_function_is_called_once_at_each_state():
 @pytest.mark.parametrize("share, passes", [(1e-3, True), (0.4, False)])
 def test_rtol_is_of_the_values_of_an_entry_wherever_its_terms_are(share, passes):
     """Aloft the terms of M are large; one entry at one state of many that is off by a third of it does not pass."""
-    aloft = PENDULUM.replace("<worldbody>", '<worldbody><body pos="0 0 20">').replace(
-        "</worldbody>", "</body></worldbody>"
-    )
     q = np.random.default_rng(4).uniform(-1.0, 1.0, (50, 2))
     M = np.array([mass_matrix(row) for row in q])
     M[7, 1, 1] *= 1.0 + share
-    (worst, *_) = compare.differences(aloft, mass_matrix=M, q=q, rtol=2e-3)
+    (worst, *_) = compare.differences(at_height(20), mass_matrix=M, q=q, rtol=2e-3)
     assert (worst.ratio <= 1.0) is passes and worst.entry == "M[knee][knee]"
 
 
@@ -144,13 +146,11 @@ def test_rtol_is_of_the_values_of_an_entry_wherever_its_terms_are(share, passes)
 def test_constants_rounded_to_six_digits_get_an_rtol_however_far_away(height, share, rounds, monkeypatch):
     """Far away the terms of each entry are large, and a slip is small compared with them."""
     monkeypatch.setattr("compare.agreement.why.SECONDS_OF_CAUSE", 0.0)
-    aloft = PENDULUM.replace("<worldbody>", f'<worldbody><body pos="0 0 {height}">')
     scaled = {"mass_matrix": lambda q: mass_matrix(q) * (1.0 + share)}
-    aloft = aloft.replace("</worldbody>", "</body></worldbody>")
-    rtol = advised(aloft, **scaled)
+    rtol = advised(at_height(height), **scaled)
     assert (rtol is not None) == rounds
     if rounds:
-        compare.assert_agrees(aloft, **scaled, rtol=rtol)
+        compare.assert_agrees(at_height(height), **scaled, rtol=rtol)
 
 
 def test_no_rtol_is_advised_beside_a_cause_or_another_rtol_or_without_numbers(given):
@@ -316,11 +316,10 @@ def test_a_wrong_number_in_values_with_noise_has_its_uncertainty(of):
     rng = np.random.default_rng(5)
     states = dict(zip(("q", "qd", "tau"), rng.uniform(-2.0, 2.0, (3, 200, 2))))
     function = RIGHT[of]
-    values = np.array(
-        [function(*state[: 3 if of == "acceleration" else 2]) for state in zip(*states.values())]
-    )
+    if of == "bias":
+        del states["tau"]
+    values = np.array([function(*state) for state in zip(*states.values())])
     values = values * (1.0 + 1e-3 * rng.normal(size=values.shape))
-    states = states if of == "acceleration" else {name: states[name] for name in ("q", "qd")}
     said = message_of(HEAVIER, **{of: values}, **states).partition("Probable cause: mass of body")[2].split()
     value, deviation = float(said[1]), float(said[3])
     assert abs(value - 2.0) < 4.0 * deviation < 0.01 and said[4:7] == ["kg", "instead", "of"]
@@ -369,9 +368,8 @@ def test_a_table_without_speeds_says_that_velocity_terms_were_not_compared(qd, w
         warnings.simplefilter("always")
         agrees(bias=bias, q=q, qd=qd)
         agrees(mass_matrix=mass_matrix, q=q, qd=qd)
-    assert [("velocity terms" in str(one.message), one.filename) for one in caught] == [
-        (True, __file__)
-    ] * warns
+    said = [("velocity terms" in str(one.message), one.filename) for one in caught]
+    assert said == [(True, __file__)] * warns
 
 
 def test_an_entry_that_agrees_has_no_cause():
@@ -407,12 +405,9 @@ def test_a_table_whose_states_are_rounded_too(more, is_rounded):
     assert ("to 2 decimals, and so are its states" in message) is is_rounded
 
 
-@pytest.mark.parametrize("factors, said", [
-    ([25.0, 1.0], "tau of hip: your acceleration takes 25 times it"),
-    ([1.0, 0.0], "tau of knee: your acceleration does not depend"),
-])  # fmt: skip
-def test_inputs_of_accelerations_are_named(factors, said):
-    assert said in message_of(acceleration=lambda q, v, t: acceleration(q, v, np.array(factors) * t))
+def test_a_torque_on_which_accelerations_do_not_depend_is_named():
+    said = message_of(acceleration=lambda q, v, t: acceleration(q, v, [1.0, 0.0] * t))
+    assert "tau of knee: your acceleration does not depend" in said
 
 
 @pytest.mark.parametrize("force, is_found", [
@@ -440,10 +435,6 @@ def test_equations_with_the_gravcomp_of_the_file_are_said_to_agree(share, says):
     """A pendulum of 2 kg at 0.5 m, three quarters of whose weight the file takes."""
     text = """<mujoco><worldbody><body name="bob" gravcomp="0.75"><joint name="hip" axis="0 1 0"/>
 <inertial pos="0 0 -0.5" mass="2" diaginertia="0.1 0.1 0.01"/></body></worldbody></mujoco>"""
-    with pytest.raises(AssertionError) as error:
-        compare.assert_agrees(
-            text,
-            mass_matrix=lambda q: np.full((1, 1), 0.6),
-            bias=lambda q, qd: (1.0 - share) * 9.81 * np.sin(q),
-        )
-    assert ("gravcomp of bob: with it your equations agree" in str(error.value)) == says
+    bias = lambda q, qd: (1.0 - share) * 9.81 * np.sin(q)  # noqa: E731
+    said = message_of(text, mass_matrix=lambda q: [[0.6]], bias=bias)
+    assert ("gravcomp of bob: with it your equations agree" in said) == says

@@ -23,6 +23,7 @@ from compare.run import examine as experiment
 from compare.run.reference import compared_with
 
 STATIC = ["mass", "gravity", "acceleration"]
+ALL = "all", "--quick", "--mjcf", "double.xml", "--reference"
 OTHERS = [name for name in EXPERIMENTS if name not in (*STATIC, "trajectory", "diagnosis")]
 
 
@@ -76,42 +77,29 @@ def test_what_is_wrong_is_seen_where_it_acts(folder, asked, names, where, quanti
 
 def test_one_slip_is_one_cause_beneath_the_first_experiment_that_differs(folder, capsys):
     """What explains the same is beneath it, and what own equations do not serve is one line."""
+    those = {name: EXPERIMENTS[name] for name in (*STATIC, *OTHERS[:3], "diagnosis")}
     with pytest.MonkeyPatch.context() as patch, without_workers():
         for module in (command, command_line, experiment):
-            patch.setattr(
-                module,
-                "EXPERIMENTS",
-                {name: EXPERIMENTS[name] for name in (*STATIC, *OTHERS[:3], "diagnosis")},
-            )
-        status, out, _ = answered(
-            ["all", "--quick", "--mjcf", "double.xml", "--reference", "mine.py:sign"], capsys
-        )
+            patch.setattr(module, "EXPERIMENTS", those)
+        status, out, _ = answered([*ALL, "mine.py:sign"], capsys)
     lines, words = out.splitlines(), [line.split()[:2] for line in out.splitlines() if line]
     at = words.index(["acceleration", "differs"])
-    assert (
-        status == 1
-        and words[at + 1] == ["CAUSE", "h[hip],"]
-        and sum(line[0] == "CAUSE" for line in words) == 1
-    )
+    assert status == 1 and words[at + 1] == ["CAUSE", "h[hip],"]
+    assert sum(line[0] == "CAUSE" for line in words) == 1
     assert ["double.xml", "and"] in words and "3 experiments need more than mass_matrix and bias." in lines
     assert "With the cause mended, M and h agree at all 24 states of the search." in lines
     assert not {"parameters", "FAIL"} & {line[0] for line in words} and max(map(len, lines)) <= 100
     (cause,) = json.loads(Path("reports/latest/results.json").read_text())["causes"]
-    alone = cause["text"].split("; or ")
-    assert len(alone) > 1 and [line.strip() for line in lines if line.startswith("     or ")] == [
-        f"or {x}" for x in alone[1:]
-    ]
+    _, *others = cause["text"].split("; or ")
+    assert others and [f"     or {x}" for x in others] == [x for x in lines if x.startswith("     or ")]
 
 
 def test_what_is_not_finite_is_said_before_causes_and_nothing_is_said_to_be_mended(folder, capsys):
     """h[hip] is NaN, h[knee] is 0: the latter has a cause."""
-    (folder / "holed.py").write_text(
-        "from mine import *\n\nholed = changed(bias=lambda q, v: np.array([np.nan, 0.0]))\n"
-    )
+    holed = "holed = changed(bias=lambda q, v: np.array([np.nan, 0.0]))"
+    (folder / "holed.py").write_text(f"from mine import *\n\n{holed}\n")
     with without_workers():
-        status, out, _ = answered(
-            ["all", "--quick", "--mjcf", "double.xml", "--reference", "holed.py:holed"], capsys
-        )
+        status, out, _ = answered([*ALL, "holed.py:holed"], capsys)
     words = " ".join(out.split())
     assert status == 1 and "With the cause mended" not in words
     assert 0 < words.index("bias is not finite") < words.index("CAUSE ")
@@ -121,11 +109,8 @@ def test_torques_that_act_with_gears_are_one_cause_in_words(folder):
     geared = "lambda q, v, tau: acceleration(q, v, [25.0, 2.0] * tau)"
     (folder / "gears.py").write_text(f"from mine import *\n\ngears = changed(acceleration={geared})\n")
     (cause,) = examined(folder, "gears.py:gears", ["acceleration", "diagnosis"]).causes
-    said = (
-        "tau of hip: your acceleration takes 25 times it",
-        "tau of knee: your acceleration takes 2 times it",
-    )
-    assert all(part in cause.text for part in said)
+    for name, gear in (("hip", 25), ("knee", 2)):
+        assert f"tau of {name}: your acceleration takes {gear} times it" in cause.text
 
 
 def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
@@ -134,10 +119,8 @@ def test_accelerations_or_inverse_dynamics_alone_are_a_reference(folder):
     assert asked == ["acceleration", "trajectory", "diagnosis"]
     assert not examined(folder, "mine.py:alone", asked).failed
     assert not examined(folder, "mine.py:inverse", STATIC).failed
-    for reference, place in (
-        ("alone_sign", "h[hip], coefficient of knee'^2"),
-        ("alone_damped", "damping of hip"),
-    ):
+    of_sign = "h[hip], coefficient of knee'^2"
+    for reference, place in (("alone_sign", of_sign), ("alone_damped", "damping of hip")):
         run = examined(folder, f"mine.py:{reference}", ["acceleration", "diagnosis"])
         assert run.causes[0].place == place
         assert {check.experiment for check in run.failed} == {"acceleration", "diagnosis"}
@@ -184,9 +167,8 @@ def test_a_report_has_what_can_be_compared_and_the_rest_gets_status_2(inside, fo
     status, out, err = answered(["speed", *asked], capsys)
     assert (status, out) == (2, "") and "speed does not apply to double" in err.splitlines()[-1]
     status, out, err = answered(["gravity", "--joints=-hip,knee", *asked], capsys)
-    assert (status, err) == (1, "a user's file may print\n") and out.startswith(
-        "\ndouble.xml and mine.py:Object differ"
-    )
+    assert (status, err) == (1, "a user's file may print\n")
+    assert out.startswith("\ndouble.xml and mine.py:Object differ")
     results = json.loads((folder / "out" / "results.json").read_text(encoding="utf-8"))
     assert results["reference"] == {"kind": "own", "name": "mine.py:Object"} and not results["passed"]
     assert {path.name for path in folder.iterdir()} == {"double.xml", "mine.py", "numbers_beside.py", "out"}

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
-from itertools import combinations, permutations, product
+from itertools import chain, combinations, permutations, product
 
 import numpy as np
 
@@ -16,12 +16,8 @@ from .terms import coefficients, terms, unit_columns
 
 Parallel = tuple[str, np.ndarray, np.ndarray]  # a name, a column (states, entries) and its factors (states,)
 OF_FACTORS = "coefficient", "term"  # kinds
-ANGLE, FACTOR, ORDER, CONSTANT = (
-    0.45,
-    0.5,
-    0.25,
-    1.05,
-)  # costs; a constant is rather a number that nobody writes
+ANGLE, FACTOR, ORDER = 0.45, 0.5, 0.25  # costs
+CONSTANT = 1.05  # rather a number that nobody writes
 ORDERED = " in the angular velocity", " in the positions"  # where alone an order may be another
 MOST_HINGES = 4  # of which products of sines and cosines are tried
 CLOSE = 1e-6  # of a coefficient, before the values are compared
@@ -110,42 +106,35 @@ def functions_of(equations: Equations) -> list[dict[str, np.ndarray]]:
 
     One table, and for each slide those times its length and its square.
     """
-    joints, one, angles = (
-        list(zip(equations.joints.items(), equations.tree.reference)),
-        np.ones(len(equations.q)),
-        [],
-    )
-    for (name, at), zero in joints:
-        if at.kind == "hinge":
-            angles.append((name, equations.q[:, at.q.start] - zero))
-    powers = []
-    for name, angle in angles if len(angles) <= MOST_HINGES else ():
-        sine, cosine = np.sin(angle), np.cos(angle)
-        of_hinge = {
-            "": one,
-            f"sin({name})": sine,
-            f"cos({name})": cosine,
-            f"sin({name}) cos({name})": sine * cosine,
-        }
-        powers.append(of_hinge | {f"sin({name})^2": sine**2, f"cos({name})^2": cosine**2})
+    tree, one = equations.tree, np.ones(len(equations.q))
+    hinges, slides = list[tuple[str, np.ndarray]](), list[tuple[str, np.ndarray]]()
+    for (name, joint), zero in zip(equations.joints.items(), tree.reference):
+        if joint.kind == "slide":
+            slides.append((name, equations.q[:, joint.q.start]))
+        elif joint.kind == "hinge":
+            hinges.append((name, equations.q[:, joint.q.start] - zero))
+    if not hinges:
+        return []
+    powers, are_few = list[dict[str, np.ndarray]](), len(hinges) <= MOST_HINGES
+    for name, angle in hinges if are_few else ():
+        sine, cosine = {f"sin({name})": np.sin(angle)}, {f"cos({name})": np.cos(angle)}
+        (s, x), (c, y) = *sine.items(), *cosine.items()
+        powers.append({"": one} | sine | cosine | {f"{s} {c}": x * y, f"{s}^2": x**2, f"{c}^2": y**2})
     table = {"1": one}
     for factors in product(*(of_hinge.items() for of_hinge in powers)):
         said = " ".join(name for name, _ in factors if name) or "1"
         table[said] = np.prod([values for _, values in factors], axis=0) * one
-    for count in (1, 2, 3) if len(angles) <= MOST_HINGES else (1, 2):
-        for (first, *others), signs in product(combinations(angles, count), product("+-", repeat=count - 1)):
+    for count in (1, 2, 3) if are_few else (1, 2):
+        for (first, *others), signs in product(combinations(hinges, count), product("+-", repeat=count - 1)):
             name, angle = first
             for sign, (other, values) in zip(signs, others):
                 name, angle = f"{name} {sign} {other}", angle + float(f"{sign}1") * values
             for function, values in {"sin": np.sin(angle), "cos": np.cos(angle)}.items():
                 table |= {f"{function}({name})": values, f"{function}({name})^2": values**2}
-    tables = [table] if angles else []
-    for (name, at), _ in joints if angles else ():
-        for power, said in {1: name, 2: f"{name}^2"}.items() if at.kind == "slide" else ():
-            length = equations.q[:, at.q.start] ** power
-            tables.append(
-                {f"{said} {function}".removesuffix(" 1"): length * x for function, x in table.items()}
-            )
+    tables = [table]
+    for (name, length), (power, suffix) in product(slides, ((1, ""), (2, "^2"))):
+        of_length = {f"{name}{suffix} {said}".removesuffix(" 1"): x for said, x in table.items()}
+        tables.append({said: length**power * x for said, x in of_length.items()})
     return tables
 
 
@@ -155,7 +144,7 @@ def instead_of(found: np.ndarray, table: dict[str, np.ndarray]) -> Iterator[tupl
     Of several of these, which are the same by an identity, the shortest.
     """
     names, values = list(table), np.array([*table.values()])
-    alone, pairs = list[tuple[int, str, np.ndarray]](), list[tuple[int, str, np.ndarray]]()
+    alone, pairs = list[tuple[str, np.ndarray]](), list[tuple[str, np.ndarray]]()
     for k, right in enumerate([np.zeros_like(found), *values]):
         changes = values - right
         sizes = changes @ found / np.fmax((changes**2).sum(axis=1), 1e-300)
@@ -166,10 +155,10 @@ def instead_of(found: np.ndarray, table: dict[str, np.ndarray]) -> Iterator[tupl
             if k:
                 said = f"{size} {names[j]} instead of {size} {names[k - 1]}"
             said = said.replace(" 1 ", " ").removesuffix(" 1")
-            (pairs if k else alone).append((len(said), said, sizes[j] * changes[j]))
+            (pairs if k else alone).append((said, sizes[j] * changes[j]))
     for likely in (alone, pairs):
-        least = min((length for length, *_ in likely), default=0)
-        yield from ((said, change) for length, said, change in likely if length == least)
+        least = min((len(said) for said, _ in likely), default=0)
+        yield from (pair for pair in likely if len(pair[0]) == least)
 
 
 def other_angles(equations: Equations, search: Search) -> Iterator[Hypothesis]:
@@ -178,22 +167,17 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Hypothesis]:
     if not tables:
         return
     for place, column, found in parallel(search, unit_columns(equations).items()):
-        for table in tables:
-            for said, change in instead_of(found, table):
-                values, cost = (
-                    search.right + change[:, None] * column,
-                    ANGLE if np.ptp(change) > 0.0 else CONSTANT,
-                )
-                yield slip(equations.right, place, said, values, cost, "angle")
+        for said, change in chain.from_iterable(instead_of(found, table) for table in tables):
+            values, is_constant = search.right + change[:, None] * column, np.ptp(change) == 0.0
+            yield slip(equations.right, place, said, values, CONSTANT if is_constant else ANGLE, "angle")
     factors = [*coefficients(equations), *terms(equations)]
     columns = [(one.cause.place, one.added) for one in factors if one.cause.kind in OF_FACTORS]
     hinges = [name for name, kind in zip(equations.joints, equations.tree.kind) if kind == "hinge"]
     for (place, column, _), name in product(parallel(search, columns), hinges):
         for yours, other in permutations(("1", f"sin({name})", f"cos({name})"), 2):
             change = tables[0][yours] / tables[0][other] - 1.0
-            said = f"{yours} for {other}"
-            said = f"{other} left out" if yours == "1" else said
-            said = f"{yours} too many" if other == "1" else said
+            said = f"{other} left out" if yours == "1" else f"{yours} too many"
+            said = said if "1" in (yours, other) else f"{yours} for {other}"
             values = search.right + change[:, None] * column
             yield slip(equations.right, place, said, values, FACTOR, "factor")
 

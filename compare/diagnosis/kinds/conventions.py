@@ -27,14 +27,8 @@ from ..hypothesis import Hypothesis
 from ..model import Equations
 from .terms import speeds_of_joints
 
-COSTS = {
-    "sign": 0.0,
-    "order": 0.25,
-    "unit": 0.1,
-    "angles": 0.0,
-    "displacement": 0.1,
-    "axes": 0.15,
-}  # of kinds
+# of kinds
+COSTS = {"sign": 0.0, "order": 0.25, "unit": 0.1, "angles": 0.0, "displacement": 0.1, "axes": 0.15}
 FIRST, OF_NAME, OF_SLIDE = 0.1, 0.15, 0.2  # more, of the first joint, of each other, of a slide
 BLOCK = 64  # conventions that are evaluated together
 PARALLEL = 1e-9  # of a cosine from 1
@@ -61,9 +55,7 @@ class Convention:
         moved = velocity_terms + np.einsum("sij,sj->si", M, self.drift)
         return St @ M @ self.S, np.einsum("sij,sj->si", St, moved), np.einsum("sij,sj->si", St, rest)
 
-    def removed(
-        self, M: ndarray, right: ndarray, h: ndarray, rest: ndarray
-    ) -> tuple[ndarray, ndarray, ndarray]:
+    def removed(self, M: ndarray, right: ndarray, h: ndarray, rest: ndarray) -> tuple[ndarray, ...]:
         """Given Mbar, h and h at rest, in this convention, as the model has them. right: the model's Mbar."""
         back = np.linalg.inv(self.S)
         transposed = np.swapaxes(back, 1, 2)
@@ -252,10 +244,8 @@ def of_balls(equations: Equations) -> Iterator[Convention]:
             causes = [named("axes", place, explains) for place, explains in said.items() if explains]
             if causes:
                 yield Convention(together(causes, 0.0), own_q, own_qd, S, drift)
-        for explains, factor in {
-            "twice as large, q' = q omega for q omega / 2": 2.0,
-            "half as large": 0.5,
-        }.items():
+        factors = {"twice as large, q' = q omega for q omega / 2": 2.0, "half as large": 0.5}
+        for explains, factor in factors.items():
             S = np.eye(equations.nv)
             S[joint.qd, joint.qd] *= factor
             yield constant(equations, named("axes", f"angular velocity of {name}", explains), S)

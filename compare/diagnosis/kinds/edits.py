@@ -37,7 +37,7 @@ Way = Callable[[ndarray], ndarray]
 def edits(equations: Equations) -> Iterator[Hypothesis]:
     """The values with each edit that changes a number."""
     stated = equations.stated
-    chosen: dict[tuple[tuple[Path, str], ...], tuple[float, Edit, dict[Path, float]]] = {}
+    chosen: dict[frozenset[tuple[Path, str]], tuple[float, Edit, dict[Path, float]]] = {}
     for of_kind in KINDS:
         cost = BODY if of_kind is absent else NUMBERS
         for edit in of_kind(equations):
@@ -46,9 +46,8 @@ def edits(equations: Equations) -> Iterator[Hypothesis]:
                 changed = np.argwhere(field != stated[name]).tolist()
                 moved |= {Path(name, at := tuple(k)): float(field[at] - stated[name][at]) for k in changed}
             if moved:
-                chosen.setdefault(
-                    tuple((path, f"{x:.12g}") for path, x in moved.items()), (cost, edit, moved)
-                )
+                key = frozenset((path, f"{x:.12g}") for path, x in moved.items())
+                chosen.setdefault(key, (cost, edit, moved))
     every = list(chosen.values())
     for start in range(0, len(every), BLOCK):
         block = every[start : start + BLOCK]

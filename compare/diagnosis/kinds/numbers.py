@@ -66,10 +66,8 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Hypothesis
         of_damping, of_stiffness, of_force = (unit_of(unit, joint.kind) for unit in OF_FORCES)
         for v in range(joint.qd.start, joint.qd.stop):
             name, speed, at_joint = names[v], qd[:, v : v + 1], np.eye(qd.shape[1])[v]
-            constant, has_spring = (
-                np.ones_like(speed) * at_joint,
-                joint.kind != "ball" and tree.stiffness[i] > 0.0,
-            )
+            constant = np.ones_like(speed) * at_joint
+            has_spring = joint.kind != "ball" and tree.stiffness[i] > 0.0
             column = speed * at_joint
             yield number(f"damping of {name}", tree.damping[v], of_damping, column=column, least=0.0)
             yield number(f"friction of {name}", 0.0, of_force, column=np.sign(column), least=0.0)
@@ -95,11 +93,11 @@ def forces_of_others(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[
         of_other, unit = tree.joint_names[k], "m" if other.kind == "slide" else "rad"
         force, at_joint = unit_of("N m", joint.kind), np.eye(qd.shape[1])[joint.qd.start]
         moved = q[:, other.q] - tree.reference[k]
-        laws = [
-            (f"the speed of {of_other}", f"{force} s/{unit}", qd[:, other.qd]),
-            (of_other, f"{force}/{unit}", moved),
-        ]
-        for what, of_number, column in laws if i != k else [(f"{of_other}^3", f"{force}/{unit}3", moved**3)]:
+        laws = [(f"{of_other}^3", f"{force}/{unit}3", moved**3)]
+        if i != k:
+            laws = [(f"the speed of {of_other}", f"{force} s/{unit}", qd[:, other.qd])]
+            laws.append((of_other, f"{force}/{unit}", moved))
+        for what, of_number, column in laws:
             place = f"force at {tree.joint_names[i]} of {what}"
             yield number(place, 0.0, of_number, CROSS, "cross", column=column * at_joint)
 
@@ -151,9 +149,8 @@ def numbers(equations: Equations) -> Iterator[Hypothesis]:
         carried = [("com", b) for b, of_joint in enumerate(tree.body_joint) if of_joint == i]
         carried += [("offset", j) for j, parent in enumerate(tree.parent) if parent == i]
         of_parent = Frame(np.zeros(3), equations.axes_at(tree.parent[i]))
-        for axis, one in zip(
-            XYZ, triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent)
-        ):
+        offsets = triple(f"offset {{}} of {name}", "m", length, Path("offset", (i,)), of_parent)
+        for axis, one in zip(XYZ, offsets):
             yield one
             if joint.kind != "slide":
                 pairs = product(carried, one.moves)

@@ -1,12 +1,11 @@
 """Mbar and h by the recursion of Newton and Euler with one slip: motion outward, forces and moments inward.
 
 A slip is a record in SLIPS: the step that it changes, its place, what is wrong there, where it is made. A step's
-wrong values are where `Recursion.step` is called with its name. Mbar are the forces of unit accelerations, h
+wrong values are where `Recursion.step` or `signed` is called with its name. Mbar are the forces of unit accelerations, h
 those without acceleration. Arrays are (rows, 3), in the world's axes.
 """
 
-from collections.abc import Callable, Iterator
-from functools import partial
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +29,6 @@ class Slip(NamedTuple):
     at: str = "joint"
 
 
-Wrong = Callable[[], ndarray]  # the wrong values of a step
 AXES = "not turned to the axes of the body before"
 SLIPS = (
     Slip("order", "rotation of {}", "before those of the joints that carry it"),
@@ -62,20 +60,19 @@ SLIPS = (
 
 
 class Frame(NamedTuple):
-    """A joint's frame and its motion."""
+    """A joint's frame and its motion, (rows, ...)."""
 
-    turn: ndarray  # (rows, 3, 3)
-    own: ndarray  # its turn in its parent's frame, (rows, 3, 3)
-    arm: ndarray  # from the joint before, (rows, 3)
-    axes: list[ndarray]
+    R: ndarray
+    own: ndarray  # its rotation in its parent's frame
+    arm: ndarray  # from the joint before
+    axes: ndarray  # (rows, speeds, 3)
     omega: ndarray
     alpha: ndarray
     a: ndarray  # of the origin
-    slides: bool = False
 
 
 def rotated(R: ndarray, r: ndarray) -> ndarray:
-    return np.einsum("sij,sj->si", R, r)
+    return np.einsum("sij,s...j->s...i", R, r)
 
 
 def backward(R: ndarray) -> ndarray:
@@ -93,60 +90,55 @@ class Recursion:
     """
 
     def __init__(
-        self, tree: tmt.Tree, q: ndarray, qd: ndarray, qdd: ndarray, gravity: ndarray, slip: str = "",
-        at: ndarray | None = None,
-    ):  # fmt: skip
-        self.tree, self.q, self.qd, self.qdd = tree, q, qd, qdd
-        self.slip, self.at, self.rows = slip, at, len(q)
-        self.joints, zero = tree.coordinates.joints, np.zeros((len(q), 3))
-        self.identity = np.broadcast_to(np.eye(3), (len(q), 3, 3))
-        self.world = Frame(self.identity, self.identity, zero, [], zero, zero, -gravity)
+        self, tree: tmt.Tree, slip: str, at: ndarray, q: ndarray, qd: ndarray, qdd: ndarray, gravity: ndarray
+    ):
+        self.tree, self.q, self.qd, self.qdd, self.slip, self.at = tree, q, qd, qdd, slip, at
+        zero, identity = np.zeros((len(q), 3)), np.broadcast_to(np.eye(3), (len(q), 3, 3))
+        self.world = Frame(identity, identity, zero, zero[:, None], zero, zero, -gravity)
+        self.following = {parent: k for k, parent in reversed(list(enumerate(tree.parent)))}  # the first
         self.frames: list[Frame] = []
         self.frames += map(self.frame, range(len(tree.parent)))
 
-    def step(self, name: str, index: int, right: ndarray, wrong: Wrong | None = None) -> ndarray:
+    def step(self, name: str, index: int, right: ndarray, wrong: ndarray | float = 0.0) -> ndarray:
         """A step's values: wrong ones, by default zero, in the rows with this slip at a joint or body."""
-        if name != self.slip or self.at is None or not self.at[index].any():
+        if name != self.slip:
             return right
-        where = self.at[index].reshape(-1, *[1] * (right.ndim - 1))
-        return np.where(where, wrong() if wrong else 0.0, right)
+        return np.where(self.at[index].reshape(-1, *[1] * (right.ndim - 1)), wrong, right)
+
+    def signed(self, name: str, index: int, right: ndarray) -> ndarray:
+        """A step's values, which may be left out or have the other sign."""
+        return self.step(f"minus {name}", index, self.step(name, index, right), -right)
 
     def before(self, i: int) -> Frame:
         return self.frames[self.tree.parent[i]] if self.tree.parent[i] >= 0 else self.world
 
     def frame(self, i: int) -> Frame:
         """The frame of a joint, outward."""
-        step, joint, parent, columns = self.step, self.joints[i], self.before(i), list(self.q.T)
-        offset = [np.broadcast_to(x, self.rows) for x in origin_in_parent(self.tree, i, columns)]
-        arm = rotated(parent.turn, np.stack(offset, axis=-1))
-        local = [np.broadcast_to(axis, arm.shape) for axis in np.array(self.tree.axis[joint.qd])]
-        rates, forced = self.qd[:, joint.qd], self.qdd[:, joint.qd]
-        if joint.kind == "slide":
-            axis = step("axis", i, rotated(parent.turn, local[0]), lambda: local[0])
-            a = parent.a + self.carried(i, arm, parent.omega, parent.alpha) + axis * forced
-            a = a + 2.0 * np.cross(parent.omega, axis * rates)
-            return parent._replace(own=self.identity, arm=arm, axes=[axis], a=a, slides=True)
-        own = matrices(rotation_in_parent(self.tree, i, columns), self.rows)
-        turn = parent.turn @ step("transposed", i, own, lambda: backward(own))
-        turn = step("order", i, turn, lambda: own @ parent.turn)
-        turn = step("absolute", i, turn, lambda: own)
-        carrier = turn if joint.kind == "ball" else parent.turn
-        axes = [step("axis", i, rotated(carrier, axis), axis.copy) for axis in local]
-        skipped = parent.turn @ backward(parent.own)  # of the joint before that
-        axes = [
-            step("axis before", i, right, partial(rotated, skipped, axis)) for right, axis in zip(axes, local)
-        ]
-        spin = np.einsum("ksc,sk->sc", axes, rates)
-        back = turn @ own @ backward(parent.turn)
-        omega = step("both back", i, parent.omega, lambda: rotated(back, parent.omega))
-        turning = step("both back", i, parent.alpha, lambda: rotated(back, parent.alpha))
-        convective = step("alpha", i, np.cross(omega, spin))
-        convective = step("minus alpha", i, convective, lambda: -convective)
-        alpha = turning + convective + np.einsum("ksc,sk->sc", axes, forced)
+        step, tree, parent, columns, rows = self.step, self.tree, self.before(i), list(self.q.T), len(self.q)
+        joint, offset = tree.coordinates.joints[i], origin_in_parent(tree, i, columns)
+        arm = rotated(parent.R, np.stack([np.broadcast_to(x, rows) for x in offset], axis=-1))
+        slides, own = joint.kind == "slide", self.world.own
+        if not slides:
+            own = matrices(rotation_in_parent(tree, i, columns), rows)
+        R = parent.R @ step("transposed", i, own, backward(own))
+        R = step("order", i, R, own @ parent.R)
+        R = R if slides else step("absolute", i, R, own)
+        local = np.tile(tree.axis[joint.qd], (rows, 1, 1))
+        axes = step("axis", i, rotated(R if joint.kind == "ball" else parent.R, local), local)
+        if not slides:
+            axes = step("axis before", i, axes, rotated(parent.R @ backward(parent.own), local))
+        rates, forced = (np.einsum("skc,sk->sc", axes, x[:, joint.qd]) for x in (self.qd, self.qdd))
+        a = step("a", i, parent.a, rotated(R @ backward(parent.R), parent.a))
         moved = self.carried(i, arm, parent.omega, parent.alpha)
-        moved = step("own motion", i, moved, lambda: self.carried(i, arm, parent.omega + spin, alpha))
-        a = moved + step("a", i, parent.a, lambda: rotated(turn @ backward(parent.turn), parent.a))
-        return Frame(turn, own, arm, axes, omega + spin, alpha, a)
+        if slides:
+            a = a + moved + forced + 2.0 * np.cross(parent.omega, rates)
+            return parent._replace(own=own, arm=arm, axes=axes, a=a)
+        back = R @ own @ backward(parent.R)
+        omega = step("both back", i, parent.omega, rotated(back, parent.omega))
+        alpha = step("both back", i, parent.alpha, rotated(back, parent.alpha))
+        alpha = alpha + self.signed("alpha", i, np.cross(omega, rates)) + forced
+        moved = step("own motion", i, moved, self.carried(i, arm, parent.omega + rates, alpha))
+        return Frame(R, own, arm, axes, omega + rates, alpha, a + moved)
 
     def carried(self, i: int, arm: ndarray, omega: ndarray, alpha: ndarray) -> ndarray:
         """The acceleration of the end of an arm from that of its beginning."""
@@ -155,52 +147,41 @@ class Recursion:
     def wrench(self, b: int) -> tuple[ndarray, ndarray]:
         """The force of a body, and its moment about the origin of its joint."""
         step, tree, joint = self.step, self.tree, self.tree.body_joint[b]
-        frame, first, mass, I = self.frames[joint], self.frames[0], tree.mass[b], np.array(tree.inertia[b])
-        com = np.broadcast_to(np.array(tree.com[b]), (self.rows, 3))
-        c = rotated(frame.turn, com)
-        c = step("com before", b, c, lambda: rotated(frame.turn @ backward(frame.own), com))
-        I, omega, alpha = frame.turn @ I @ backward(frame.turn), frame.omega, frame.alpha
-        following = [k for k, parent in enumerate(tree.parent) if parent == joint]
-        arm = step("offset for CoM", b, c, lambda: self.frames[following[0]].arm if following else c)
+        frame, first, com = self.frames[joint], self.frames[0], np.tile(tree.com[b], (len(self.q), 1))
+        R, omega, alpha = frame.R, frame.omega, frame.alpha
+        c = step("com before", b, rotated(R, com), rotated(R @ backward(frame.own), com))
+        arm = c
+        if joint in self.following:
+            arm = step("offset for CoM", b, c, self.frames[self.following[joint]].arm)
         swung = step("centripetal", b, centripetal(omega, arm))
-        F = mass * (frame.a + np.cross(alpha, arm) + swung)
-        spun = rotated(I, omega)
-        gyroscopic = np.cross(omega, spun)
-        of_first = rotated(frame.turn @ backward(first.turn), first.omega)
-        gyroscopic = step("first omega", b, gyroscopic, lambda: np.cross(omega, rotated(I, of_first)))
-        gyroscopic = step("alpha for omega", b, gyroscopic, lambda: np.cross(omega, rotated(I, alpha)))
-        own_axes = frame.turn @ backward(self.before(joint).turn)
-        lever = step("lever", b, c, lambda: rotated(own_axes, frame.arm))
-        moment = step("CoM", b, np.cross(lever, F))
-        moment = step("minus CoM", b, moment, lambda: -moment)
-        return F, rotated(I, alpha) + gyroscopic + moment
+        F = tree.mass[b] * (frame.a + np.cross(alpha, arm) + swung)
+        I, of_first = R @ np.array(tree.inertia[b]) @ backward(R), rotated(backward(first.R), first.omega)
+        gyroscopic = np.cross(omega, rotated(I, omega))
+        gyroscopic = step("first omega", b, gyroscopic, np.cross(omega, rotated(I @ R, of_first)))
+        gyroscopic = step("alpha for omega", b, gyroscopic, np.cross(omega, rotated(I, alpha)))
+        lever = step("lever", b, c, rotated(R @ backward(self.before(joint).R), frame.arm))
+        return F, rotated(I, alpha) + gyroscopic + self.signed("CoM", b, np.cross(lever, F))
 
     def forces(self) -> ndarray:
         """Of the joints, (rows, nv), inward."""
-        step, tree, tau = self.step, self.tree, np.zeros(self.qd.shape)
-        F, N = np.zeros((2, len(tree.parent), self.rows, 3))
+        step, tree, tau = self.step, self.tree, np.array(self.tree.armature or 0.0) * self.qdd
+        F, N = np.zeros((2, len(tree.parent), len(self.q), 3))
         for b, joint in enumerate(tree.body_joint):
             if joint >= 0:
                 force, moment = self.wrench(b)
                 F[joint] += force
                 N[joint] += moment
-        for i in range(len(tree.parent))[::-1]:
-            frame, parent, joint = self.frames[i], self.before(i), tree.parent[i]
-            acting = F[i] if frame.slides else N[i]
-            following = next((k for k, before in enumerate(tree.parent) if before == i), i)
-            for n, axis in enumerate(frame.axes, self.joints[i].qd.start):
-                along = step("next axis", i, axis, self.frames[following].axes[0].copy)
-                tau[:, n] = np.einsum("sc,sc->s", along, acting)
-            if joint < 0:
-                continue
-            to_parent = parent.turn @ backward(frame.turn)
-            force = step("force", i, F[i], partial(rotated, to_parent, F[i]))
-            turned = parent.turn @ backward(frame.own) @ backward(frame.turn)
-            force = step("force turned back", i, force, partial(rotated, turned, F[i]))
-            lever = step("moment", i, np.cross(frame.arm, force))
-            F[joint] += force
-            N[joint] += step("n", i, N[i]) + step("minus moment", i, lever, partial(np.negative, lever))
-        return tau + np.array(tree.armature or [0.0] * len(tree.axis)) * self.qdd
+        for i, joint in reversed(list(enumerate(tree.parent))):
+            frame, parent, acting = self.frames[i], self.before(i), F[i] if tree.kind[i] == "slide" else N[i]
+            axes = step("next axis", i, frame.axes, self.frames[self.following.get(i, i)].axes[:, :1])
+            tau[:, tree.coordinates.joints[i].qd] += np.einsum("skc,sc->sk", axes, acting)
+            if joint >= 0:
+                force = step("force", i, F[i], rotated(parent.R @ backward(frame.R), F[i]))
+                back = parent.R @ backward(frame.R @ frame.own)
+                force = step("force turned back", i, force, rotated(back, F[i]))
+                F[joint] += force
+                N[joint] += step("n", i, N[i]) + self.signed("moment", i, np.cross(frame.arm, force))
+        return tau
 
 
 def slips_of_recursion(equations: Equations) -> Iterator[Hypothesis]:
@@ -219,15 +200,14 @@ def slips_of_recursion(equations: Equations) -> Iterator[Hypothesis]:
 
 def evaluated(equations: Equations, slip: str, at: ndarray) -> ndarray:
     """The values with a slip at the joints or bodies of each column of `at`, (columns, states, entries)."""
-    (states, nv), columns = equations.qd.shape, at.shape[1]
-    zero, unit = np.zeros((states, nv)), np.broadcast_to(np.eye(nv)[:, None], (nv, states, nv))
-    qd = np.concatenate([[equations.qd, zero], np.zeros_like(unit)])  # (2 + nv, states, nv)
-    qdd, g = np.concatenate([[zero, zero], unit]), np.zeros((2 + nv, states, 3))
-    g[1] = equations.tree.gravity
-    rows = np.tile(at[:, :, None], (1, 1, (2 + nv) * states)).reshape(len(at), -1)
-    q = np.tile(equations.q, (columns * (2 + nv), 1))
-    qd, qdd, g = (np.tile(part.reshape(-1, part.shape[2]), (columns, 1)) for part in (qd, qdd, g))
-    forces = Recursion(equations.tree, q, qd, qdd, g, slip, rows).forces()
-    forces = forces.reshape(columns, 2 + nv, states, nv)
-    M = np.moveaxis(forces[:, 2:], 1, 3)  # (columns, states, row, unit)
-    return equations.layout.packed(M, forces[:, 0], forces[:, 1])
+    (states, nv), blocks = (
+        equations.qd.shape,
+        2 + equations.nv,
+    )  # velocity terms, h at rest, unit accelerations
+    qd, qdd, g = (np.zeros((blocks, states, n)) for n in (nv, nv, 3))
+    qd[0], g[1], qdd[2:] = equations.qd, equations.tree.gravity, np.eye(nv)[:, None]
+    each = np.tile(equations.q, (blocks, 1)), *(part.reshape(blocks * states, -1) for part in (qd, qdd, g))
+    rows = (np.tile(part, (at.shape[1], 1)) for part in each)
+    forces = Recursion(equations.tree, slip, np.repeat(at, blocks * states, axis=1), *rows).forces()
+    forces = forces.reshape(at.shape[1], blocks, states, nv)
+    return equations.layout.packed(np.moveaxis(forces[:, 2:], 1, 3), forces[:, 0], forces[:, 1])

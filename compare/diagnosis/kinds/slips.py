@@ -1,7 +1,7 @@
 """The slips that are made in positions, angular velocities, tensors and axes; see kinematics.py."""
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 from numpy import ndarray
@@ -14,6 +14,7 @@ from .numbers import XYZ
 
 BLOCK = 48  # slips that are evaluated together
 WAYS = "", "", ", with the right accelerations"  # how it is said
+FACTORS = {"left out": -1.0, "with the other sign": -2.0}  # of what is changed, which are added
 VELOCITY, ROTATION = "velocity of the CoM of {}", "angular velocity of {}"  # places
 Key = tuple[str, int | None, str]  # a place, its body (None: all), what it is
 
@@ -21,28 +22,29 @@ Key = tuple[str, int | None, str]  # a place, its body (None: all), what it is
 def slips_of_kinematics(equations: Equations) -> Iterator[Hypothesis]:
     """The values with each slip of one body, and with those that all bodies can have, in each of the ways."""
     kinematics, names = Kinematics(equations), equations.tree.body_names
-    total, bodies = dict[Key, list[ndarray]](), dict[Key, int]()
-    slips = list(all_slips(kinematics))
-    for start in range(0, len(slips), BLOCK):
-        block = slips[start : start + BLOCK]
+    found: dict[Key, list[list[ndarray]]] = {}
+    for block in batched(all_slips(kinematics), BLOCK):
         for item, added in zip(block, kinematics.effects(block)):
             for body in (item.body, None) if item.of_body else (None,):
-                key = item.place, body, item.explains
-                total[key] = [a + b for a, b in zip(total[key], added)] if key in total else added
-                bodies[key] = bodies.get(key, 0) + 1
-    for (place, body, explains), ways in total.items():
-        count, owner = bodies[place, body, explains], ""
+                found.setdefault((item.place, body, item.explains), []).append(added)
+    for (place, body, explains), effects in found.items():
+        ways, owner = [np.sum(way, axis=0) for way in zip(*effects)], ""
         if "{}" in place:
             owner = "every body" if body is None else names[body]
         size, said = max(np.abs(way).max() for way in ways), list[ndarray]()
-        if size == 0.0 or (owner and body is None and count < 2):
+        if size == 0.0 or (owner and body is None and len(effects) < 2):
             continue
         for values, how in zip(ways, WAYS[-len(ways) :]):
             if all(np.abs(values - other).max() > SAME * size for other in said):
                 said.append(values)
-                owners = count if owner else 1
                 values = equations.right + values
+                owners = len(effects) if owner else 1
                 yield slip(equations.right, place, explains + how, values, owner=owner, owners=owners)
+
+
+def batched(slips: Iterator[Changed], count: int) -> Iterator[list[Changed]]:
+    while block := list(islice(slips, count)):
+        yield block
 
 
 def all_slips(mechanism: Kinematics) -> Iterator[Changed]:
@@ -52,12 +54,12 @@ def all_slips(mechanism: Kinematics) -> Iterator[Changed]:
         R, I = mechanism.motion().turns[mechanism.tree.body_joint[b]], np.array(mechanism.tree.inertia[b])
         back, axes = np.swapaxes(R, 1, 2), mechanism.equations.frame_of(b).axes
         stated = axes.T @ I @ axes  # its numbers in the file
-        yield Changed("inertia of {}", "not turned to the inertial frame", b, inertia=back @ stated @ R - I)
-        yield Changed(
-            "inertia of {}", "turned back, R' I R for R I R'", b, inertia=back @ back @ I @ R @ R - I
-        )
-        said = "in world axes, R I R', for one in its own axes"
-        yield Changed("inertia of {}", said, b, inertia=R @ I @ back - I)
+        for explains, wrong in {
+            "not turned to the inertial frame": back @ stated @ R,
+            "turned back, R' I R for R I R'": back @ back @ I @ R @ R,
+            "in world axes, R I R', for one in its own axes": R @ I @ back,
+        }.items():
+            yield Changed("inertia of {}", explains, b, inertia=wrong - I)
         if is_small:
             yield from slips_of_components(mechanism, b)
             yield from slips_of_position(mechanism, b)
@@ -72,6 +74,10 @@ def only(columns: ndarray, rows: int | list[int], axes: slice | int = slice(None
     return alone
 
 
+def acts(change: ndarray) -> bool:
+    return bool(np.abs(change).max() > SAME)
+
+
 def slips_of_rotation(mechanism: Kinematics, b: int) -> Iterator[Changed]:
     """Of whole columns of B: of joints before the body, of joints that do not move it, one of them."""
     tree, B, speeds = mechanism.tree, mechanism.B[b], mechanism.equations.speeds
@@ -80,17 +86,16 @@ def slips_of_rotation(mechanism: Kinematics, b: int) -> Iterator[Changed]:
     moving = [v for v in range(mechanism.nv) if B[v].any()]
     others = [v for v in moving if mechanism.joint_of[v] not in path[:count]]
     if others:
-        dB = only(-B, others)
+        dB, joint = only(-B, others), tree.coordinates.joints[tree.body_joint[b]]
         yield Changed(ROTATION, "relative to the body before, not to the world", b, B=dB)
-        joint = tree.coordinates.joints[tree.body_joint[b]]
         if joint.kind == "hinge":
             axis = np.array(tree.axis[joint.qd.start])
             along = (dB @ axis)[..., None] * axis
-            if np.abs(along - dB).max() > SAME and np.abs(along).max() > SAME:
+            if acts(along - dB) and acts(along):
                 yield Changed("spin of {} about its own axis", "relative to the body before", b, B=along)
-    for v in moving if len(moving) > 1 and mechanism.nv <= MOST_SPEEDS else ():
-        yield Changed(ROTATION, f"speed of {speeds[v]} left out", b, B=only(-B, v))
-        yield Changed(ROTATION, f"speed of {speeds[v]} with the other sign", b, B=only(-2.0 * B, v))
+    single = moving if len(moving) > 1 and mechanism.nv <= MOST_SPEEDS else []
+    for v, (how, factor) in product(single, FACTORS.items()):
+        yield Changed(ROTATION, f"speed of {speeds[v]} {how}", b, B=only(factor * B, v))
     turning = [v for v, i in enumerate(mechanism.joint_of) if v not in moving and tree.kind[i] != "slide"]
     if turning:
         dB = only(mechanism.in_body(b, mechanism.motion().axes), turning)
@@ -101,15 +106,14 @@ def slips_of_components(mechanism: Kinematics, b: int) -> Iterator[Changed]:
     """Of one component of the angular velocity in the body's axes."""
     tree, B, speeds = mechanism.tree, mechanism.B[b], mechanism.equations.speeds
     for v, k in product(range(mechanism.nv), range(3)):
-        if np.abs(B[v][:, k]).max() <= SAME:
-            continue
         element, said = only(B, v, k), f"{ROTATION}, {XYZ[k]} in its own axes"
-        if np.abs(np.delete(B[v], k, axis=1)).max() > SAME:
-            yield Changed(said, f"{speeds[v]}' left out", b, B=-element)
-            yield Changed(said, f"{speeds[v]}' with the other sign", b, B=-2.0 * element)
+        if not acts(element):
+            continue
+        for how, factor in FACTORS.items() if acts(np.delete(B[v], k, axis=1)) else ():
+            yield Changed(said, f"{speeds[v]}' {how}", b, B=factor * element)
         for i in mechanism.hinges(tree.body_joint[b]):
             other = only(mechanism.angular(b, i, "complement") - B, v, k)
-            if np.abs(other).max() > SAME:
+            if acts(other):
                 what = f"sine and cosine of {tree.joint_names[i]} exchanged at {speeds[v]}'"
                 yield Changed(said, what, b, B=other)
 
@@ -124,11 +128,11 @@ def slips_of_position(mechanism: Kinematics, b: int) -> Iterator[Changed]:
         if other != b and mechanism.J[other][v].any():
             dJ = only(mechanism.J[other] - J, v)
             yield Changed(VELOCITY, f"part of {speeds[v]} as that of {tree.body_names[other]}", b, dJ)
-    path, origins = tree.path(tree.body_joint[b]), mechanism.motion().origins
+    path, (axes, origins, _) = tree.path(tree.body_joint[b]), mechanism.motion()
     for i, following in zip(path[1:], path):
         if tree.kind[i] == "hinge" and np.any(tree.offset[following]):
             v, dJ = tree.coordinates.joints[i].qd.start, np.zeros_like(J)
-            dJ[v] = np.cross(mechanism.motion().axes[v], origins[i] - origins[following])
+            dJ[v] = np.cross(axes[v], origins[i] - origins[following])
             yield Changed(VELOCITY, f"lever of {speeds[v]} from {tree.joint_names[following]}", b, dJ)
     for s, part in enumerate(mechanism.segments(b)):
         for explains, dJ in wrong_segments(mechanism, b, s):
@@ -139,48 +143,45 @@ def slips_of_position(mechanism: Kinematics, b: int) -> Iterator[Changed]:
 
 
 def wrong_segments(mechanism: Kinematics, b: int, s: int) -> Iterator[tuple[str, ndarray]]:
-    part, every = mechanism.segments(b)[s], list(range(mechanism.nv))
+    part, every, names = mechanism.segments(b)[s], list(range(mechanism.nv)), mechanism.tree.joint_names
     J = part.jacobian
     if not part.of_com:
         yield "left out", -J
-    for k in range(3) if np.abs(J).max() > SAME else ():
-        if np.abs(J[:, :, k]).max() > SAME:
+    for k in range(3) if acts(J) else ():
+        if acts(J[:, :, k]):
             yield f"{XYZ[k]} with the other sign", only(-2.0 * J, every, k)
+        order = [k if j == k else 3 - k - j for j in range(3)]
         first, second = np.delete(range(3), k)
-        order = np.arange(3)
-        order[[first, second]] = second, first
         yield f"{XYZ[first]} and {XYZ[second]} exchanged", J[:, :, order] - J
     for i in (i for i in part.hinges if mechanism.tree.kind[i] == "hinge"):
-        name = mechanism.tree.joint_names[i]
-        for other, said in (("opposite", "sign of {}"), ("complement", "sine and cosine of {} exchanged"),
-                            ("zero", "not turned by {}")):  # fmt: skip
+        for other, said in {
+            "opposite": f"sign of {names[i]}", "complement": f"sine and cosine of {names[i]} exchanged",
+            "zero": f"not turned by {names[i]}",
+        }.items():  # fmt: skip
             change = mechanism.segments(b, i, other)[s].jacobian - J
             if other == "zero":
-                yield f"not turned by {name}", change
-            for k in range(3):
-                if np.abs(change[:, :, k]).max() > SAME:
-                    yield f"{said.format(name)} in {XYZ[k]}", only(change, every, k)
+                yield said, change
+            for k in (k for k in range(3) if acts(change[:, :, k])):
+                yield f"{said} in {XYZ[k]}", only(change, every, k)
 
 
 def slips_of_axes(mechanism: Kinematics) -> Iterator[Changed]:
     """The axis of a hinge: that of the next joint, or not turned by one of those before."""
-    tree, motion = mechanism.tree, mechanism.motion()
+    tree, (axes, origins, turns) = mechanism.tree, mechanism.motion()
     for i in (i for i, kind in enumerate(tree.kind) if kind == "hinge"):
         v, name, wrong = tree.coordinates.joints[i].qd.start, tree.joint_names[i], dict[str, ndarray]()
         following = [k for k, parent in enumerate(tree.parent) if parent == i and tree.kind[k] == "hinge"]
         for k in following[:1]:
-            wrong[f"that of {tree.joint_names[k]}"] = motion.axes[tree.coordinates.joints[k].qd.start]
+            wrong[f"that of {tree.joint_names[k]}"] = axes[tree.coordinates.joints[k].qd.start]
         before = mechanism.hinges(tree.parent[i])
         for k in before:
             wrong[f"not turned by {tree.joint_names[k]}"] = mechanism.motion(k, "zero").axes[v]
         if len(before) > 1:
-            wrong["not turned to the inertial frame"] = 0.0 * motion.axes[v] + np.array(tree.axis[v])
+            wrong["not turned to the inertial frame"] = 0.0 * axes[v] + np.array(tree.axis[v])
         for b, (said, axis) in product(range(len(tree.mass)), wrong.items()):
-            change = axis - motion.axes[v]
-            if not tree.moves(b)[i] or np.abs(change).max() <= SAME:
-                continue
-            com = motion.origins[tree.body_joint[b]]
-            com = com + motion.turns[tree.body_joint[b]] @ np.array(tree.com[b])
-            dJ, dB = np.zeros((2, *mechanism.J[b].shape), complex)
-            dJ[v], dB[v] = np.cross(change, com - motion.origins[i]), mechanism.in_body(b, change)
-            yield Changed(f"axis of {name}", said, b, dJ, dB, of_body=False)
+            joint, change = tree.body_joint[b], axis - axes[v]
+            if tree.moves(b)[i] and acts(change):
+                com = origins[joint] + turns[joint] @ np.array(tree.com[b])
+                dJ, dB = np.zeros((2, *mechanism.J[b].shape), complex)
+                dJ[v], dB[v] = np.cross(change, com - origins[i]), mechanism.in_body(b, change)
+                yield Changed(f"axis of {name}", said, b, dJ, dB, of_body=False)

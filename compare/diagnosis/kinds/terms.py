@@ -79,14 +79,10 @@ def is_between(pair: Sequence[int], first: list[int], second: list[int]) -> bool
     return (i in first and j in second) or (j in first and i in second)
 
 
-def in_rows(equations: Equations, rows: list[int]) -> list[int]:
-    return [entry for i in rows for entry in equations.layout.of_row(i)]
-
-
 def terms(equations: Equations) -> Iterator[Hypothesis]:
     """Factors of terms of each body, and of several together: in all, in an entry of Mbar, a row of h."""
     bodies, is_small = sets_of_bodies(equations.tree), equations.nv <= MOST_SPEEDS
-    of_rows = {name: in_rows(equations, rows) for name, rows in rows_of_h(equations).items()}
+    of_rows = {name: equations.layout.of_rows(rows) for name, rows in rows_of_h(equations).items()}
     for name, together in ({name: (term,) for term, name in OF_TERM.items()} | TOGETHER).items():
         added = np.sum([equations.terms[term] for term in together], axis=0)
         for body, those in bodies:
@@ -110,8 +106,8 @@ def coefficients(equations: Equations) -> Iterator[Hypothesis]:
     of_h |= {"gravity of ": (0.0 * rest, rest)}
     for name, rows in rows_of_h(equations).items():
         for before, values in of_h.items():
-            column = layout.packed(0.0 * M, *values)
-            yield factor("coefficient", f"{before}{name}", column, in_rows(equations, rows), COEFFICIENT)
+            column, of_row = layout.packed(0.0 * M, *values), layout.of_rows(rows)
+            yield factor("coefficient", f"{before}{name}", column, of_row, COEFFICIENT)
     if equations.nv > MOST_SPEEDS:
         return
 
@@ -148,10 +144,8 @@ def squares_of_velocities(equations: Equations) -> Iterator[Hypothesis]:
     if equations.nv > MOST_SPEEDS:
         return
     kinematics, layout, tree = Kinematics(equations), equations.layout, equations.tree
-    entries, n = (
-        [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]],
-        len(equations.q),
-    )
+    entries = [entry.named(equations.speeds) for entry in equations.entries[equations.in_M]]
+    n = len(equations.q)
 
     def column(pairs: list[tuple[ndarray, ndarray]], gravity: ndarray) -> ndarray:
         """What a mass of 1 adds whose v^2 has these products of Jacobians, and its weight."""

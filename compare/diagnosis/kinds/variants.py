@@ -1,15 +1,14 @@
 """Explanations without a number to fit: options of a file or a program, slips of derivatives."""
 
 from collections.abc import Iterator
-from itertools import combinations, product
+from itertools import product
 
 import numpy as np
 
 from tmt import literal
 
 from ..hypothesis import Hypothesis, option, slip
-from ..model import TINY, Equations, Path
-from .terms import speeds_of_joints
+from ..model import TINY, Changes, Equations, Path
 
 OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, and the factors of both
     ("gradient of the kinetic energy in h", "left out"): (1.0, 0.0),
@@ -42,9 +41,11 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
     for place, stated, explains, of_speeds, of_gravity in of_h:
         yield option(equations.right, place, stated, explains, equations.with_bias(of_speeds, of_gravity))
     if q.shape == qd.shape:
+        together = [np.concatenate([q, speeds], axis=1) for speeds in (qd, 0.0 * qd)]
+        in_turn = [Equations(tree, both[:, ::2], both[:, 1::2]).h for both in together]
+        exchanged = [Equations(tree, speeds, q).h for speeds in (qd, 0.0 * qd)]
         orders = {"exchanged, bias(qd, q)": exchanged, "in turn, q1, qd1, q2, qd2, ...": in_turn}
-        for explains, order in orders.items():
-            h, still = (Equations(tree, *order(q, speeds)).h for speeds in (qd, 0.0 * qd))
+        for explains, (h, still) in orders.items():
             values = equations.with_bias(h - still, still)
             yield option(equations.right, "arguments of bias", "bias(q, qd)", explains, values)
     triangles = {"off": M - M * np.eye(equations.nv)}
@@ -54,34 +55,10 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
         for explains, factor in OF_SLOPES.items():
             values = equations.layout.packed(M + (factor - 1.0) * change, moving, rest)
             yield option(equations.right, f"entries of M {where} the diagonal", "there", explains, values)
-    for (first, rows), (second, columns) in combinations(speeds_of_joints(tree).items(), 2):
-        if len(rows) == len(columns) > 1:
-            above, below = np.ix_(range(len(q)), rows, columns), np.ix_(range(len(q)), columns, rows)
-            upper, lower = f"M[{first}][{second}]", f"M[{second}][{first}]"
-            for place, blocks in {
-                upper: [above],
-                lower: [below],
-                f"{upper} and {lower}": [above, below],
-            }.items():
-                turned = M.copy()
-                for at in blocks:
-                    turned[at] = np.swapaxes(M[at], 1, 2)
-                values = equations.layout.packed(turned, moving, rest)
-                yield option(equations.right, place, "there", "transposed", values)
+    rotors: Changes = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
     if any(tree.armature):
-        rotors = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
-        yield option(
-            equations.right, "armature", "on the diagonal of Mbar", "left out", equations.values(rotors)[0]
-        )
-
-
-def exchanged(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return qd, q
-
-
-def in_turn(q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    together = np.concatenate([q, qd], axis=1)
-    return together[:, ::2], together[:, 1::2]
+        without = equations.values(rotors)[0]
+        yield option(equations.right, "armature", "on the diagonal of Mbar", "left out", without)
 
 
 def lagrange(equations: Equations) -> Iterator[Hypothesis]:

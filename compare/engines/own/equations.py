@@ -141,10 +141,7 @@ class OwnEquations:
             raise OwnError(f"the equations have no {call(name)}")
         batch, rows = rows_of_states(*states)
         finite = np.isfinite(np.concatenate(rows, axis=1)).all(axis=1)  # not where a run has diverged
-        own = self.own_states([part[finite] for part in rows])
-        computed, raised = self.each(name, own)
-        bad = ~np.isfinite(computed).all(axis=tuple(range(1, computed.ndim))) & ~raised
-        self.note(name, "is not finite", own, bad)
+        computed = self.each(name, self.own_states([part[finite] for part in rows]))
         values = np.full((len(finite), *computed.shape[1:]), np.nan)
         values[finite] = computed
         return values.reshape((*batch, *values.shape[1:]))
@@ -154,32 +151,31 @@ class OwnEquations:
         ways = (self.joints.own_positions, self.joints.own_speeds, self.joints.own_forces)
         return [way(part) for way, part in zip(ways, rows)]
 
-    def each(self, name: str, states: States) -> tuple[ndarray, ndarray]:
-        """Values (states, ...) at states in the user's joints, NaN where it raised; and where it raised.
+    def each(self, name: str, states: States) -> ndarray:
+        """Values (states, ...) at states in the user's joints, NaN where it raised.
 
         OwnError if it raises where it is called for the first time.
         """
-        raised, values = np.zeros(len(states[0]), bool), dict[int, ndarray]()
-        for i in range(len(raised)):
-            state = [part[i] for part in states]
+        values, bad = dict[int, ndarray](), np.zeros(len(states[0]), bool)
+        for i, state in enumerate(zip(*states)):
             key = name, *(part.tobytes() for part in state)
             try:
                 if key not in self.known:
                     self.known[key] = self.called(name, state)
                 values[i] = self.known[key]
+                bad[i] = not np.isfinite(values[i]).all()
             except OwnError as error:
                 if name not in self.times:
                     raise OwnError(f"{error}, at {state_in_words(state)}") from error
-                raised[i] = True
-                self.note(name, str(error), states, np.arange(len(raised)) == i)
-                continue
+                self.note(name, str(error), states, np.arange(len(bad)) == i)
+        self.note(name, "is not finite", states, bad)
         if len(self.known) > MOST_KNOWN:
             self.known.clear()
         of_one = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
-        together = np.full((len(raised), *of_one), np.nan)
+        together = np.full((len(bad), *of_one), np.nan)
         for i, value in values.items():
             together[i] = value
-        return together, raised
+        return together
 
     def called(self, name: str, state: States) -> ndarray:
         """The value of a function at one state; OwnError if it is none."""

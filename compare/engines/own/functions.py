@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import prod
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,6 +47,7 @@ METHOD_NAMES = {name: name for name in QUANTITIES} | {"gravity": "gravity_balanc
 INVERSE = "inverse_dynamics"  # the name of a function that brings Mbar and h
 PUSH = 2.0**20  # rad/s2: gravity, which is subtracted, rounds little of what it needs
 QUICK = 1e-3  # s per state: functions that are as fast as this are called some hundred times more
+MODULE = "compare_own_"  # how the name of the module of a user's file begins
 MOST_SHOWN = 8  # numbers of a state in a message
 
 
@@ -62,13 +62,15 @@ def functions_of(source: object, coordinates: Coordinates, required: Sequence[st
     """The functions of QUANTITIES that a source has, by name; OwnError if a required one is missing."""
     if isinstance(source, tmt.Tree):
         return of_tree(source, coordinates)
-    symbols = attribute(source, "symbols")
-    values = {name: attribute(source, name) for name in QUANTITIES}
-    values = {name: value for name, value in values.items() if value is not None}
-    functions = {name: function_of(name, value, symbols, coordinates) for name, value in values.items()}
-    if callable(forces := attribute(source, INVERSE)) and not functions:
+    symbols, forces = attribute(source, "symbols"), attribute(source, INVERSE)
+    functions = {}
+    for name in QUANTITIES:
+        if (value := attribute(source, name)) is not None:
+            functions[name] = function_of(name, value, symbols, coordinates)
+    if callable(forces) and not functions:
         functions = of_inverse_dynamics(forces, coordinates)
-    missing, name = [name for name in required if name not in functions], source_name(source)
+    name = str(getattr(source, "__name__", type(source).__name__)).removeprefix(MODULE)
+    missing = [name for name in required if name not in functions]
     if missing and "acceleration" not in functions:
         others = f"or {call('acceleration')}, or {INVERSE}(q, qd, qdd)"
         raise OwnError(f"{name} has no {missing[0]}; expected {' and '.join(map(call, required))}, {others}")
@@ -79,17 +81,14 @@ def functions_of(source: object, coordinates: Coordinates, required: Sequence[st
 
 def of_inverse_dynamics(forces: Function, coordinates: Coordinates) -> dict[str, Function]:
     """Mbar and h of a function tau = Mbar qdd + h of q, qd, qdd."""
-
-    def bias(q: np.ndarray, qd: np.ndarray) -> Any:
-        return forces(q, qd, 0.0 * qd)
+    still = np.zeros(coordinates.nv)
 
     def mass_matrix(q: np.ndarray) -> np.ndarray:
-        still = np.zeros(coordinates.nv)
         pushes = [still, *(PUSH * np.eye(coordinates.nv))]
         at_rest, *pushed = (np.asarray(forces(q, still, push), float).ravel() for push in pushes)
         return np.stack([values - at_rest for values in pushed], axis=1) / PUSH
 
-    return {"mass_matrix": mass_matrix, "bias": bias}
+    return {"mass_matrix": mass_matrix, "bias": lambda q, qd: forces(q, qd, still)}
 
 
 def call(name: str) -> str:
@@ -97,24 +96,13 @@ def call(name: str) -> str:
     return f"{name}({', '.join(QUANTITIES[name].state)})"
 
 
-def attribute(source: object, name: str) -> object:
+def attribute(source: object, name: str) -> Any:
     return source.get(name) if isinstance(source, Mapping) else getattr(source, name, None)
-
-
-def source_name(source: object) -> str:
-    """A source in a message."""
-    if isinstance(source, type):
-        return f"the class {source.__name__}"
-    file = Path(getattr(source, "__file__", None) or "__init__.py").name
-    if isinstance(source, ModuleType) and file != "__init__.py":  # a user's file has no other name
-        return file
-    name = getattr(source, "__name__", None)
-    return name if isinstance(name, str) else f"the {type(source).__name__}"
 
 
 def names_of(source: object) -> Sequence[str] | None:
     """The joints that the source states, in its own order; None if it states none."""
-    names: Any = attribute(source, "joint_names")
+    names = attribute(source, "joint_names")
     try:
         return names if names is None or isinstance(names, str) else list(names)
     except TypeError:
@@ -122,9 +110,8 @@ def names_of(source: object) -> Sequence[str] | None:
 
 
 def of_tree(tree: tmt.Tree, coordinates: Coordinates) -> dict[str, Function]:
-    nq, nv = tree.coordinates.nq, tree.coordinates.nv
-    if (nq, nv) != (coordinates.nq, coordinates.nv):
-        has = f"{nq} positions and {nv} speeds ({', '.join(tree.joint_names)})"
+    if (tree.nq, tree.nv) != (coordinates.nq, coordinates.nv):
+        has = f"{tree.nq} positions and {tree.nv} speeds ({', '.join(tree.joint_names)})"
         wanted = f"{coordinates.nq} and {coordinates.nv} ({', '.join(coordinates.names)})"
         raise OwnError(f"the Tree has {has}; expected {wanted}")
     return {name: partial(getattr(tmt, method), tree) for name, method in METHOD_NAMES.items()}
@@ -154,7 +141,7 @@ def function_of(name: str, value: Any, symbols: object, coordinates: Coordinates
 
 
 def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Coordinates) -> Function:
-    """The function of a SymPy matrix or expression of these symbols, in order."""
+    """The function of a SymPy matrix or expression of these symbols, in order; they may be functions of time."""
     import sympy
 
     def flat(value: Any) -> list[Any]:
@@ -167,10 +154,8 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
     nq, nv = coordinates.nq, coordinates.nv
     counts = [nq, nq + nv, nq + 2 * nv]  # of the symbols of q, of q and qd, of q, qd and tau
     if len(symbols) not in counts or len(set(symbols)) < len(symbols):
-        listed = ", ".join(map(str, symbols))
         wanted = f"{nq} of q, or {counts[1]} of q and qd in order, each once"
-        raise OwnError(f"{name} has the symbols {listed}; expected {wanted}")
-    # symbols may be functions of time, and qd their derivatives
+        raise OwnError(f"{name} has the symbols {', '.join(map(str, symbols))}; expected {wanted}")
     plain = [sympy.Dummy() for _ in symbols]
     entries = [entry.xreplace(dict(zip(symbols, plain))) for entry in entries]
     used = {symbol for entry in entries for symbol in entry.free_symbols}
@@ -187,12 +172,10 @@ def of_symbols(name: str, matrix: object, given_symbols: object, coordinates: Co
     try:
         evaluated = sympy.lambdify(plain[:taken], entries, "numpy", cse=True)
     except Exception as error:  # of expressions that have no numbers, such as zoo
-        listed = ", ".join(map(str, plain))
-        raise OwnError(f"{name} cannot be evaluated as a function of {listed}: {error!r}") from None
+        raise OwnError(f"{name} cannot be evaluated as a function of {plain}: {error!r}") from None
 
     def function(*states: np.ndarray) -> np.ndarray:
-        numbers = [number for state in states for number in state][: len(plain)]
-        return np.array(evaluated(*numbers), dtype=float).reshape(shape)
+        return np.array(evaluated(*np.concatenate(states)[: len(plain)]), dtype=float).reshape(shape)
 
     return function
 
@@ -222,10 +205,7 @@ def in_words(shape: Shape) -> str:
 
 
 def converted(name: str, value: object, shape: Shape, or_else: str = "", at_which: str = "") -> np.ndarray:
-    """The value called `name` as an array of float of a shape; OwnError if its type or shape is wrong.
-
-    or_else, at_which: the end of the message about the type, about the shape.
-    """
+    """The value called `name` as floats of a shape; OwnError, with one of these ends, if its type or shape is wrong."""
     array = numbers_of(value)
     if array is None:
         raise OwnError(f"{name} is {shown(value)}; expected real numbers of shape {in_words(shape)}{or_else}")

@@ -22,7 +22,7 @@ from ...core.errors import described
 from ...core.words import listed
 from ...process.interrupt import Now, is_interrupt
 from ...process.streams import Capped
-from .functions import OwnError
+from .functions import MODULE, OwnError
 
 FORMS_OF_REFERENCE = "FILE.py:OBJECT or MODULE:OBJECT"
 SHOWN_NAMES = 6  # names in a message where none is close
@@ -38,25 +38,28 @@ def own_object(stated: str) -> object:
     sys.path.append(folder)  # last: no file in it shadows a package
     try:
         with aside(place), raised_in(place):
-            value = part_of(module_of_file(place) if is_file else module_named(place), place, name)
+            module = module_of_file(Path(place), place) if is_file else module_named(place)
+            if name and not hasattr(module, name):
+                public = [other for other in dir(module) if other[0] != "_"]
+                names = [other for other in public if not inspect.ismodule(getattr(module, other, None))]
+                raise OwnError(f"{place} has no {name!r}{close_names(name, names)}")
+            value = getattr(module, name) if name else module
             return value() if inspect.isclass(value) else value
     finally:
         del sys.path[-1 - sys.path[::-1].index(folder)]  # the last of its name, added above
 
 
-def module_of_file(place: str) -> ModuleType:
-    path = Path(place)
+def module_of_file(path: Path, place: str) -> ModuleType:
     if path.is_dir():
         raise OwnError(f"{place} is a folder; expected a Python file")
     if not path.is_file():
         neighbours = [file.name for file in path.parent.glob("*.py")]
         raise OwnError(f"{place}: no such file{close_names(path.name, neighbours)}")
-    name = f"compare_own_{path.stem}"  # a name that nothing else has: a file numpy.py shadows no package
+    name = f"{MODULE}{path.stem}"  # a name that nothing else has: a file numpy.py shadows no package
     loader = importlib.machinery.SourceFileLoader(name, str(path.resolve()))
     spec = importlib.util.spec_from_loader(name, loader)
     assert spec is not None  # since there is a loader
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look for it there
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)  # dataclasses look for it there
     loader.exec_module(module)
     return module
 
@@ -65,29 +68,19 @@ def module_named(name: str) -> ModuleType:
     if not all(part.isidentifier() for part in name.split(".")):
         raise OwnError(f"{name!r} is not the name of a module; expected {FORMS_OF_REFERENCE}")
     try:
-        spec = importlib.util.find_spec(name)  # which imports a package that it is in
+        is_there = importlib.util.find_spec(name) is not None  # which imports a package that it is in
     except ModuleNotFoundError:
-        spec = None
-    if spec is None:
+        is_there = False
+    if not is_there:
         neighbours = [file.stem for file in Path().glob("*.py")]
         raise OwnError(f"{name}: no such module{close_names(name, neighbours)}")
     return importlib.import_module(name)
 
 
-def part_of(module: ModuleType, place: str, name: str) -> object:
-    """The object of a name in a module; without a name the module itself."""
-    if name and not hasattr(module, name):
-        public = [other for other in dir(module) if other[0] != "_"]
-        names = [other for other in public if not inspect.ismodule(getattr(module, other, None))]
-        raise OwnError(f"{place} has no {name!r}{close_names(name, names)}")
-    return getattr(module, name) if name else module
-
-
 def close_names(name: str, known: Sequence[str]) -> str:
     """The names that are close to one, else all if they are few, for a message."""
-    close = difflib.get_close_matches(name, known, 3, 0.6)
-    if not close and len(known) <= SHOWN_NAMES:
-        close = list(known)
+    few = list(known) if len(known) <= SHOWN_NAMES else []
+    close = difflib.get_close_matches(name, known, 3, 0.6) or few
     return f"; known: {listed(close)}" if close else ""
 
 
