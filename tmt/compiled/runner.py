@@ -92,14 +92,12 @@ class Runner:
 
     def outcome(self, q: Array, qd: Array, info: Array, every: int = 1) -> Ended:
         steps, codes = (q.shape[1] - 1) * every, info[:, :2]
-        taken = steps * len(q)
-        if codes[:, 0].any():
-            taken = int(np.where(codes[:, 0], codes[:, 1] + 1, steps).sum())
-            for i in np.flatnonzero(codes[:, 0]):
-                first = codes[i, 1] // every + 1
-                q[i, first:], qd[i, first:] = np.nan, np.nan
+        for i in np.flatnonzero(codes[:, 0]):
+            first = codes[i, 1] // every + 1
+            q[i, first:], qd[i, first:] = np.nan, np.nan
         if self.stepping.adaptive or self.stepping.solves_stages:
             return codes, int(info[:, 2].sum())
+        taken = int(np.where(codes[:, 0], codes[:, 1] + 1, steps).sum())
         return codes, taken * self.stepping.stages
 
 

@@ -36,21 +36,16 @@ class SemiImplicitEuler(Method):
     implicit_springs: bool = False
     implicit_gains: bool = False
 
-    def entries_of_gains(self, tree: Mechanism) -> tuple[Gains, Gains]:
-        """The implicit entries of the gains of position and of speed, (nv, nv) each; () for none."""
-        if self.implicit_springs:
-            return (tree.position_gain, tree.speed_gain)
-        if not (self.implicit_gains and tree.speed_gain):
-            return (), ()
-        connected = zip(tree.speed_gain, on_one_path(tree))
-        return (), tuple([gain if is_on else 0.0 for gain, is_on in zip(*rows)] for rows in connected)
-
     def stiffness_and_damping(self, tree: Mechanism) -> tuple[Gains, Gains]:
-        n = len(tree.axis)
-        has_stiffness = self.implicit_springs and tree.has_springs
-        stiffness = by_speed(tree, tree.stiffness) if has_stiffness else [0.0] * n
-        position_gain, speed_gain = self.entries_of_gains(tree)
-        return with_diagonal(position_gain, stiffness), with_diagonal(speed_gain, tree.damping)
+        """What is implicit of the torques that are linear in q and in qd, (nv, nv) each."""
+        stiffness, nothing = [0.0] * len(tree.axis), tuple[tuple[float, ...], ...]()
+        gain, damping = nothing, nothing
+        if self.implicit_springs:
+            gain, damping, stiffness = tree.position_gain, tree.speed_gain, by_speed(tree, tree.stiffness)
+        elif self.implicit_gains:
+            connected = zip(tree.speed_gain, on_one_path(tree))
+            damping = tuple(tuple(S if is_on else 0.0 for S, is_on in zip(*rows)) for rows in connected)
+        return with_diagonal(gain, stiffness), with_diagonal(damping, tree.damping)
 
     def implicit(self, tree: Mechanism, qd: Values, dt: Scalar) -> Implicit:
         (stiff, damped), powers, moved = self.stiffness_and_damping(tree), (dt, dt * dt), [dt * v for v in qd]
@@ -76,9 +71,7 @@ def by_speed(tree: Mechanism, of_joints: Iterable[T]) -> list[T]:
 
 @lru_cache(maxsize=64)
 def on_one_path(tree: Mechanism) -> list[list[bool]]:
-    before = [{i} for i in range(len(tree.parent))]
-    for i, parent in enumerate(tree.parent):
-        before[i] |= before[parent] if parent >= 0 else set()
+    before = [tree.path(i) for i in range(len(tree.parent))]
     joint = by_speed(tree, range(len(tree.parent)))
     return [[i in before[j] or j in before[i] for j in joint] for i in joint]
 
