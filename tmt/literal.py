@@ -56,23 +56,19 @@ def answer(name: str, tree: Tree, arrays: dict[str, ArrayLike]) -> Any:
             matrix = added(matrix, implicit.matrix)
         check_regular(tree, list(state.q), matrix, batch)
     if quantity.argument == "method":
-        return step_derivatives(argument_of(name), tree, *checked)
+        q, qd, tau, dt = checked
+        try:
+            steps = transition(method_named(argument_of(name)), tree, q, qd, tau, dt[..., 0])
+        except (ArithmeticError, np.linalg.LinAlgError) as error:
+            why = f"{argument_of(name)} has no step of this size from a state: {error}"
+            raise ValueError(why) from None
+        if not np.isfinite(steps).all():
+            raise ValueError(BEYOND)
+        return steps
     values = quantity.of(state)
     if quantity.parts:
         return tuple(gather(part, batch) for part in values)
     return gather(values, batch, overflow=np.inf if name == "energy" else None)
-
-
-def step_derivatives(
-    method: str, tree: Tree, q: np.ndarray, qd: np.ndarray, tau: np.ndarray, dt: np.ndarray
-) -> np.ndarray:
-    try:
-        values = transition(method_named(method), tree, q, qd, tau, dt[..., 0])
-    except (ArithmeticError, np.linalg.LinAlgError) as error:
-        raise ValueError(f"{method} has no step of this size from a state: {error}") from None
-    if not np.isfinite(values).all():
-        raise ValueError(BEYOND)
-    return values
 
 
 def check_regular(tree: Tree, q: Values, matrix: Rows, batch: tuple[int, ...]) -> None:

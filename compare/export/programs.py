@@ -53,9 +53,8 @@ class Program(ABC):
     file = ""  # that is run, where there are others with the same expressions
 
     def __post_init__(self) -> None:
-        self.parameters = (
-            {x: np.array(value) for x, value in self.chosen.values.items()} if self.chosen else {}
-        )
+        stated = self.chosen.values if self.chosen else {}
+        self.parameters = {name: np.array(value) for name, value in stated.items()}
         self.start()
 
     @abstractmethod
@@ -76,26 +75,22 @@ class Program(ABC):
                 command, cwd=self.folder, stdin=subprocess.DEVNULL, capture_output=True, text=True,
                 errors="replace", timeout=MOST_SECONDS, check=False,
             )  # fmt: skip
-        except subprocess.TimeoutExpired:
-            raise NotRun(f"{command[0]} takes more than {MOST_SECONDS:g} s") from None
-        except OSError as error:
-            raise NotRun(f"{command[0]}: {error.strerror}") from None
+        except (subprocess.TimeoutExpired, OSError) as error:
+            raise NotRun(f"{command[0]}: {getattr(error, 'strerror', '') or error}") from None
         if done.returncode:
             lines = [line for line in (done.stderr or done.stdout).splitlines() if "error" in line]
             raise WrongProgram(f"{command[0]}: {[*lines, f'exit status {done.returncode}'][0]}")
 
 
-def parts(quantity: str) -> int:
-    """How many arrays a function returns or fills."""
-    return len(quantity_of(quantity).parts) or 1
+def found(*names: str) -> list[str]:
+    return [name for name in names if shutil.which(name)][:1]
 
 
 class CProgram(Program):
     """Compiled with -O2, called for many states by a loop in C."""
 
     def start(self) -> None:
-        compiler = shlex.split(os.environ.get("CC", ""))
-        compiler = compiler or [name for name in ("gcc", "cc", "clang") if shutil.which(name)][:1]
+        compiler = shlex.split(os.environ.get("CC", "")) or found("gcc", "cc", "clang")
         if not compiler or not shutil.which(compiler[0]):
             raise NotRun(f"no C compiler was found ({' '.join(compiler) or 'gcc, cc, clang'})")
         try:
@@ -104,8 +99,9 @@ class CProgram(Program):
             raise NotRun(f"a C library cannot be made or loaded: {error}") from None
         loops = "\n".join([f'#include "{self.name}.h"', *map(self.loop, self.quantities)])
         # the header before the source: the declarations must be those of the functions
-        texts = "-include", f"{self.name}.h", f"{self.name}.c"
-        self.library = self.compiled(compiler, "states", loops, *texts)
+        self.library = self.compiled(
+            compiler, "states", loops, "-include", f"{self.name}.h", f"{self.name}.c"
+        )
 
     def compiled(self, compiler: Sequence[str], name: str, text: str, *more: str) -> ctypes.CDLL:
         (self.folder / f"_{name}.c").write_text(f"{text}\n", encoding="utf-8")
@@ -114,15 +110,18 @@ class CProgram(Program):
 
     def loop(self, quantity: str) -> str:
         """A function in C that evaluates a quantity at n states."""
-        kind, coordinates = "float" if self.single else "double", self.tree.coordinates
-        sizes = {"q": coordinates.nq, "qd": coordinates.nv, "tau": coordinates.nv, "dt": 1}
-        size, count = prod(shape_of(quantity, self.tree)), parts(quantity)
-        given = [f"{x} + {size} * i" for x, size in sizes.items()][: len(quantity_of(quantity).takes)]
+        kind, row, size = "float" if self.single else "double", quantity_of(quantity), self.size(quantity)
+        sizes = {"q": self.tree.nq, "qd": self.tree.nv, "tau": self.tree.nv, "dt": 1}
+        count = len(row.parts) or 1
+        given = [f"{x} + {size_of} * i" for x, size_of in sizes.items()][: len(row.takes)]
         given += [*self.parameters, *(f"out + {size} * i + {size // count * k}" for k in range(count))]
         arguments = ", ".join(f"const {kind} *{x}" for x in (*sizes, *self.parameters))
         call = f"{self.name}_{identifier(quantity)}({', '.join(given)});"
         head = f"void states_{identifier(quantity)}({arguments}, {kind} *out, long n)"
         return f"{head} {{ for (long i = 0; i < n; i++) {call} }}"
+
+    def size(self, quantity: str) -> int:
+        return prod(shape_of(quantity, self.tree))
 
     def call(self, quantity: str, states: States) -> tuple[Callable[[], None], Array]:
         """A call without arguments that evaluates all states, and its output (states, *shape)."""
@@ -171,12 +170,18 @@ class CasadiProgram(PythonProgram):
 class JaxProgram(PythonProgram):
     """Functions of JAX, jitted, with 64 bits, called with all states at once."""
 
+    def start(self) -> None:
+        super().start()
+        import jax
+
+        names = map(identifier, self.quantities)
+        self.functions = {name: jax.jit(self.functions[name]) for name in names}
+
     def values(self, quantity: str, states: States) -> Array:
         import jax
 
         with jax.enable_x64(True):
-            values = jax.jit(self.functions[identifier(quantity)])(*self.arguments(quantity, states))
-            return np.stack(values, axis=1) if quantity_of(quantity).parts else np.asarray(values)
+            return super().values(quantity, states)
 
 
 class SymbolicProgram(PythonProgram):
@@ -185,8 +190,7 @@ class SymbolicProgram(PythonProgram):
     def start(self) -> None:
         super().start()
         self.file, self.matrices = f"{self.name}.py", self.functions
-        robot = Robot("", Path(), self.tree, {}, ())
-        self.functions = functions_of(self.matrices, robot.coordinates, ())
+        self.functions = functions_of(self.matrices, Robot("", Path(), self.tree, {}, ()).coordinates, ())
 
     def operations(self, quantity: str) -> int:
         import sympy
@@ -196,41 +200,34 @@ class SymbolicProgram(PythonProgram):
 
     def values(self, quantity: str, states: States) -> Array:
         function = self.functions[quantity.removesuffix("_balance")]
-        rows = zip(*self.arguments(quantity, states))
-        return np.array([function(*state) for state in rows], dtype=float)
+        return np.array([function(*state) for state in zip(*self.arguments(quantity, states))], dtype=float)
 
 
 class MatlabProgram(Program):
     """Run by Octave; states and values go through files of doubles."""
 
     def start(self) -> None:
-        found = [name for name in ("octave-cli", "octave") if shutil.which(name)]
-        if not found:
+        if not found("octave-cli", "octave"):
             raise NotRun("Octave was not found")
-        self.octave = found[0]
 
     def values(self, quantity: str, states: States) -> Array:
-        takes, results, lines = quantity_of(quantity).takes, [f"r{k}" for k in range(parts(quantity))], ["1;"]
-        for x, values in zip(takes, states):
+        row, shape, lines = quantity_of(quantity), shape_of(quantity, self.tree), ["1;"]
+        results = [f"r{k}" for k in range(len(row.parts) or 1)]
+        for x, values in zip(row.takes, states):
             np.ascontiguousarray(values).tofile(self.folder / f"{x}.bin")
             read = f"fread(f, [{values.shape[1]}, Inf], 'double')"
             lines.append(f"f = fopen('{x}.bin'); {x} = {read}; fclose(f);")
-        given = [*takes, *(f"[{'; '.join(map(repr, x.tolist()))}]" for x in self.parameters.values())]
+        given = [*row.takes, *(f"[{'; '.join(map(repr, x.tolist()))}]" for x in self.parameters.values())]
         lines.append(f"[{', '.join(results)}] = {self.name}('{identifier(quantity)}', {', '.join(given)});")
         lines += [f"f = fopen('{r}.bin', 'w'); fwrite(f, {r}, 'double'); fclose(f);" for r in results]
         (self.folder / "_states.m").write_text("\n".join(lines) + "\n", encoding="utf-8")
-        self.run(self.octave, "--norc", "--quiet", "_states.m")
-        shape = *shape_of(quantity, self.tree)[parts(quantity) > 1 :], len(states[0])
-        arrays = [np.fromfile(self.folder / f"{r}.bin").reshape(shape, order="F") for r in results]
-        arrays = [np.moveaxis(array, -1, 0) for array in arrays]
-        return np.stack(arrays, axis=1) if quantity_of(quantity).parts else arrays[0]
+        self.run(*found("octave-cli", "octave"), "--norc", "--quiet", "_states.m")
+        columns = *shape[bool(row.parts) :], len(states[0])
+        arrays = [np.fromfile(self.folder / f"{r}.bin").reshape(columns, order="F") for r in results]
+        return np.moveaxis(arrays, -1, 0).reshape(-1, *shape)
 
 
 PROGRAMS: dict[str, type[Program]] = {
-    "c": CProgram,
-    "python": PythonProgram,
-    "matlab": MatlabProgram,
-    "casadi": CasadiProgram,
-    "jax": JaxProgram,
+    "c": CProgram, "python": PythonProgram, "matlab": MatlabProgram, "casadi": CasadiProgram, "jax": JaxProgram,
     "latex": SymbolicProgram,
-}
+}  # fmt: skip
