@@ -17,7 +17,7 @@ from compare.experiments.parameters.numbers import NumberRow
 from compare.experiments.published import PrintedRow
 from compare.experiments.speed import conclusions
 from compare.experiments.speed.runs import RunRow, SpeedResult
-from compare.experiments.stability.tables import LimitRow, StabilityResult
+from compare.experiments.stability.tables import LimitRow
 from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers
@@ -178,7 +178,7 @@ AGREED = AgreementRow(engine="TMT", scene="zero", quantity="Mbar", unit="kg m2",
     ("stability", [STEP, replace(STEP, observed_dt=0.0995)], "2 0.5", ""),
 ])  # fmt: skip
 def test_the_headline_is_computed_and_comes_out_either_way(name, rows, numbers, named):
-    kind = {"stability": StabilityResult, "trajectory": TrajectoryResult}.get(name, Result)
+    kind = {"trajectory": TrajectoryResult}.get(name, Result)
     of = section(name, GOOD, rows=rows, kind=kind)
     of.result.centres = ("s",)  # postures whose limits of the step are told
     said = headline(section_with(name, of.result, ARM))

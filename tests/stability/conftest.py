@@ -1,8 +1,8 @@
 import pytest
 
-from compare.experiments.stability.tables import StabilityResult
+from compare.core.check import Result
 
 
 @pytest.fixture
 def result():
-    return StabilityResult("stability")
+    return Result("stability")

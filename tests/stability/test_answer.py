@@ -7,6 +7,7 @@ from helpers.pushed_models import INERTIA, KP, KV, LIMIT, compiled, end_speed, h
 
 import compare
 from compare.engines.mujoco.reading import read
+from compare.stability import remedies
 from compare.stability.answer import Question, StepLimitRow, answer, worst_step
 from compare.stability.motion import posture_of, postures_of
 
@@ -127,14 +128,16 @@ def test_remedies_hold_in_plain_runs():
     '<velocity joint="turn" kv="60"/>', '<damper joint="turn" kv="60" ctrlrange="0 1"/>',
     '<position joint="turn" kp="5" kv="60"/>',
 ])  # fmt: skip
-def test_speed_gains_of_every_kind_of_servo_are_reduced(actuator):
+def test_speed_gains_of_every_kind_of_servo_are_reduced(actuator, monkeypatch):
+    monkeypatch.setattr(remedies, "STRENGTHS", {"less_kv": remedies.STRENGTHS["less_kv"]})
     keys = '<key name="on" ctrl="1"/>' if "damper" in actuator else ""
     found = asked(hinge(actuator, dt=0.004, keys=keys))
     assert not found.own.stable_at_file_dt and "less_kv" in [remedy.change for remedy in found.remedies]
 
 
-def test_more_iterations_are_tried_with_the_time_of_a_step():
+def test_more_iterations_are_tried_with_the_time_of_a_step(monkeypatch):
     """The walker moves with one iteration, and stands with two, in plain runs, too."""
+    monkeypatch.setattr(remedies, "STRENGTHS", {})
     (given,) = [remedy for remedy in asked(walker(1)).remedies if remedy.change == "iterations"]
     assert given.number == 2.0 and min(given.times) > 0.0
     ends = [end_speed(walker(count), 0.005, "implicitfast", 0.1) for count in (1, 2)]

@@ -5,6 +5,7 @@ from functools import partial
 from itertools import product
 from typing import Any
 
+from ...core.check import Result
 from ...core.finding import Finding
 from ...robots import Robot
 from ...stability import push
@@ -13,7 +14,7 @@ from ...stability.equilibrium import equilibrium
 from .. import Drawing
 from ..setup import Setup
 from . import claims, departure, limits, of_file
-from .tables import SCHEMES, LimitRow, Runs, StabilityResult, methods_of
+from .tables import SCHEMES, LimitRow, Runs, methods_of
 
 DAMPINGS = (0.0, 0.5, 50.0)  # N m s/rad, added
 FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to that of the claims
@@ -71,34 +72,33 @@ def begin_of_arm(setup: Setup) -> list[Runs]:
     return begun
 
 
-def rows(setup: Setup, work: list[Runs] | None = None) -> StabilityResult:
+def rows(setup: Setup, work: list[Runs] | None = None) -> Result:
     """Of a file the limits of its steps; of the arm limits, departures and the claims."""
-    result = StabilityResult("stability")
+    result = Result("stability")
     for runs in begin(setup) if work is None else work:
         runs.judge(result, [row for found in runs.rows for row in found])
     if not setup.reading:
         centres, saddles = (postures_of(setup.robot, kind) for kind in ("centre", "saddle"))
-        result.centres = tuple(centres)
-        result.schemes = {(method.engine, method.name): method.scheme for method in methods_of(setup.engines)}
         names = [*setup.robot.postures]
         result.find("examined", noun=setup.robot.noun, centres=centres, saddle=saddles[0], names=names)
     result.tables = {name: table for name, table in result.tables.items() if table}
     return result
 
 
-def limits_shown(result: StabilityResult) -> list[LimitRow]:
-    """The rows of the limits at stable postures."""
-    return [row for row in result.rows if row.scene in result.centres]
+def limits_shown(result: Result) -> list[LimitRow]:
+    """The rows of the limits at stable postures: at the others every step fails."""
+    stable = {row.scene for row in result.rows if row.limit != "always_fails"}
+    return [row for row in result.rows if row.scene in stable]
 
 
-def headline(result: StabilityResult) -> Finding | None:
+def headline(result: Result) -> Finding | None:
     """How many limits of the step are as predicted; of a file, whether its step is stable."""
     if "step_limits" in result.tables:
         return of_file.headline(result)
     return result.finding("headline", **limits.summary(limits_shown(result))) if result.rows else None
 
 
-def figures(result: StabilityResult, robot: Robot) -> Iterator[Drawing]:
+def figures(result: Result, robot: Robot) -> Iterator[Drawing]:
     # matplotlib is for the process that draws
     from . import figures_of_file
     from . import figures_stability as drawing
@@ -114,7 +114,7 @@ def figures(result: StabilityResult, robot: Robot) -> Iterator[Drawing]:
         yield partial(drawing.draw_claims, result, robot)
 
 
-def overview(results: Mapping[str, StabilityResult], robot: Robot) -> Iterator[Drawing]:
+def overview(results: Mapping[str, Result], robot: Robot) -> Iterator[Drawing]:
     from .figures_stability import draw_overview  # matplotlib is for the process that draws
 
     if rows := limits_shown(results["stability"]):

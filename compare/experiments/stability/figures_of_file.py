@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from ...core.check import Result
 from ...core.finding import Finding
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, WIDTH
 from ...stability.answer import StepLimitRow, TriedRow
 from ..figures import chart, named_rows
 from .of_file import OF
-from .tables import StabilityResult
 
 LOOKS = {  # colour, dash, mark, width: lines that coincide are drawn over each other, the wider one below
     "implicitfast": (ORANGE, "-", "s", 3.2),
@@ -22,7 +22,7 @@ LOOKS = {  # colour, dash, mark, width: lines that coincide are drawn over each 
 }
 
 
-def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
+def draw_steps(result: Result) -> tuple[str, Figure, Finding]:
     """Two panels: the largest push over the step; the distance from fine runs over the step. All at the first posture."""
     rows, tried = first_posture(result)
     own = rows[0]
@@ -52,7 +52,7 @@ def draw_steps(result: StabilityResult) -> tuple[str, Figure, Finding]:
     return "stability_steps", fig, caption(result, own, len(pushes))
 
 
-def draw_bars(result: StabilityResult) -> tuple[str, Figure, Finding]:
+def draw_bars(result: Result) -> tuple[str, Figure, Finding]:
     """The longest step of each integrator at the first posture."""
     rows, _ = first_posture(result)
     (fig, ax), own = chart(), rows[0]
@@ -70,7 +70,7 @@ def draw_bars(result: StabilityResult) -> tuple[str, Figure, Finding]:
     return "stability_steps", fig, caption(result, own, 1)
 
 
-def first_posture(result: StabilityResult) -> tuple[list[StepLimitRow], list[TriedRow]]:
+def first_posture(result: Result) -> tuple[list[StepLimitRow], list[TriedRow]]:
     """The rows of the first posture, and the steps that were tried there."""
     _, rows = next(groupby(result.tables["step_limits"], key=lambda row: row.posture))
     kept = list(rows)
@@ -84,7 +84,7 @@ def longest(rows: list[TriedRow], push: float) -> float | None:
     return max((row.dt_s for row in pushed if row.dt_s < failing), default=None)
 
 
-def caption(result: StabilityResult, own: StepLimitRow, pushes: int) -> Finding:
+def caption(result: Result, own: StepLimitRow, pushes: int) -> Finding:
     return result.finding(
         "figure_steps", OF, posture=own.posture, dt=own.file_dt_s, integrator=own.file_integrator,
         push=own.push_rad_per_s, pushes=pushes, unit=own.unit,

@@ -1,6 +1,6 @@
 """Figures of the arm: step limits, also of the first screen; departure; claims."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,8 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ...core.check import Result
 from ...core.finding import Finding
 from ...engines import COLOURS, LABELS
+from ...engines.mujoco.engine import SCHEMES as OF_MUJOCO
 from ...judge.run import LEFT, number_or_nan
 from ...report.style import BLUE, GREEN, GREY, ORANGE, PINK, RED, SKY, WIDTH
 from ...robots import Robot
@@ -17,7 +19,7 @@ from ..figures import MOST_ROWS, chart, named_rows
 from .claims import NEAREST, claims_of, fraction
 from .departure import departure_values
 from .limits import LINEAR_DEVIATION, summary
-from .tables import ClaimRow, LimitRow, StabilityResult
+from .tables import ClaimRow, LimitRow
 
 SCHEME_LOOKS = {  # colour, dash, name
     "rk4": (GREEN, "-", "RK4"),
@@ -36,13 +38,11 @@ def look(name: str) -> tuple[str, Any, str]:
     return SCHEME_LOOKS.get(name, ("black", "-", name.replace("_", " ")))
 
 
-def limits_in(
-    ax: Axes, rows: Sequence[LimitRow], known: Mapping[tuple[str, str], str], most: int | None = None
-) -> list[Line2D]:
-    """The limits of each scheme, predicted (line) and observed (mark); the handles of a legend. known: schemes of methods."""
+def limits_in(ax: Axes, rows: Sequence[LimitRow], most: int | None = None) -> list[Line2D]:
+    """The limits of each scheme, predicted (line) and observed (mark); the handles of a legend."""
     of_scheme: dict[str, list[LimitRow]] = {}
     for row in rows:
-        of_scheme.setdefault(known.get((row.engine, row.method), row.method), []).append(row)
+        of_scheme.setdefault(OF_MUJOCO.get(row.method, row.method), []).append(row)
     of_scheme = dict(list(of_scheme.items())[:most])
     ends = [dt for row in rows for dt in (row.predicted_dt, row.observed_dt) if dt]
     low, high = min(ends) / 2, max(ends) * 2
@@ -75,17 +75,17 @@ def limits_in(
     ]
 
 
-def draw_overview(result: StabilityResult, rows: Sequence[LimitRow]) -> tuple[str, Figure, Finding]:
+def draw_overview(result: Result, rows: Sequence[LimitRow]) -> tuple[str, Figure, Finding]:
     """The limits of the first screen, all postures in one."""
     fig, ax = chart()
-    handles = limits_in(ax, rows, result.schemes, MOST_ROWS)
+    handles = limits_in(ax, rows, MOST_ROWS)
     ax.set_xlabel("largest stable dt, s")
     looks = {"ncols": 3, "fontsize": 7.5, "handletextpad": 0.1, "columnspacing": 0.8}
     fig.legend(handles=handles, loc="outside upper center", **looks)
     return "overview_limits", fig, result.finding("overview_caption", **summary(rows))
 
 
-def draw_limits(result: StabilityResult, rows: Sequence[LimitRow]) -> tuple[str, Figure, Finding]:
+def draw_limits(result: Result, rows: Sequence[LimitRow]) -> tuple[str, Figure, Finding]:
     """The limits scene by scene and damping by damping."""
     panels = list(dict.fromkeys((row.scene, row.damping) for row in rows))
     columns = min(3, len(panels))
@@ -94,7 +94,7 @@ def draw_limits(result: StabilityResult, rows: Sequence[LimitRow]) -> tuple[str,
     axes = fig.subplots(lines, columns, sharey=True, squeeze=False)
     for ax, (scene, damping) in zip(axes.flat, panels):
         here = [row for row in rows if (row.scene, row.damping) == (scene, damping)]
-        handles = limits_in(ax, here, result.schemes)
+        handles = limits_in(ax, here)
         ax.set_title(f"{scene}, damping {damping:g}" if damping else scene)
     fig.supxlabel("largest stable dt, s (damping in N m s/rad)", fontsize=9)
     fig.legend(handles=handles, loc="outside upper center", ncols=3)
@@ -104,7 +104,7 @@ def draw_limits(result: StabilityResult, rows: Sequence[LimitRow]) -> tuple[str,
     return "stability_limits", fig, result.finding("figure_limits", **about, **summary(rows))
 
 
-def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
+def draw_departure(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     """Time to leave a saddle against the size of the perturbation."""
     rows = result.tables["departure"]
     steps = sorted({row.dt for row in rows}, reverse=True)
@@ -122,8 +122,8 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
             colour, dash, _ = look(method)
             if engine == "tmt":
                 ax.plot(sizes, predicted, linestyle=dash, color=colour, linewidth=1)
-                looks: dict[str, Any] = {"color": colour, "mfc": "none", "markersize": 11 - k, "label": label}
-                ax.plot(sizes, observed, MARKS[k % 6], **looks)
+                of_tmt: dict[str, Any] = {"color": colour, "mfc": "none", "markersize": 11 - k}
+                ax.plot(sizes, observed, MARKS[k % 6], label=label, **of_tmt)
             else:
                 ax.plot(sizes, observed, MUJOCO_MARKS[k % 3], color="black", markersize=5, label=label)
         ax.set(xscale="log", ylim=(0, None), title=f"dt = {dt:.4g} s")
@@ -136,7 +136,7 @@ def draw_departure(result: StabilityResult, robot: Robot) -> tuple[str, Figure, 
     return "stability_departure", fig, result.finding("figure_departure", **values, **departure_values(rows))
 
 
-def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Finding]:
+def draw_claims(result: Result, robot: Robot) -> tuple[str, Figure, Finding]:
     """A panel for each claim that was tried: times of departure, the same over the steps, how far a kept posture moves."""
     claims, rows = claims_of(robot), result.tables["stability_claims"]
     found = [claim for claim in (1, 2, 3) if any(row.claim == claim for row in rows)]
@@ -148,16 +148,14 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
             if row.claim == claim and row.torque != NEAREST:
                 series.setdefault((row.engine, row.ulps or 0), []).append(row)
         for (engine, sign), mine in series.items():
-            looks: dict[str, Any] = {
-                "color": COLOURS[engine],
-                "fillstyle": "full" if engine == "tmt" else "none",
-            }
+            fill = "full" if engine == "tmt" else "none"
+            looks: dict[str, Any] = {"color": COLOURS[engine], "fillstyle": fill, "markersize": 5}
             where = range(1, len(mine) + 1) if claim == 1 else [row.dt for row in mine]
             values = [number_or_nan(row.moved if claim == 3 else row.observed) for row in mine]
             if claim == 2:
                 ax.plot(where, values, "-" if sign > 0 else "--", color=COLOURS[engine])
             for place, value, row in zip(where, values, mine):
-                ax.plot(place, value, "v" if row.direction == -1 else "^", markersize=5, **looks)
+                ax.plot(place, value, "v" if row.direction == -1 else "^", **looks)
         ax.set_title(f"claim {claim}: {claims.kept if claim == 3 else claims.left}")
         ax.set_xlabel("torque within one ulp" if claim == 1 else "dt, s")
         ax.set_ylabel("largest movement, rad" if claim == 3 else f"time until a movement of {LEFT:g} rad, s")
@@ -175,13 +173,6 @@ def draw_claims(result: StabilityResult, robot: Robot) -> tuple[str, Figure, Fin
         fill = "full" if engine == "tmt" else "none"
         axes[0].plot([], [], "^", color=COLOURS[engine], fillstyle=fill, label=LABELS[engine])
     fig.legend(loc="outside upper center", ncols=3, fontsize=8)
-    about: dict[str, Any] = {
-        "dt": fraction(claims.duration, claims.dt),
-        "joint": robot.joints[0],
-        "panels": len(found),
-    }
-    return (
-        "stability_claims",
-        fig,
-        result.finding("figure_claims", posture=claims.left, kept=claims.kept, **about),
-    )
+    dt, joint = fraction(claims.duration, claims.dt), robot.joints[0]
+    about: dict[str, Any] = {"posture": claims.left, "kept": claims.kept, "panels": len(found)}
+    return "stability_claims", fig, result.finding("figure_claims", dt=dt, joint=joint, **about)

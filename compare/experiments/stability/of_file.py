@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About
+from ...core.check import AT_OWN_STEP, AT_REQUESTED_STEP, About, Result
 from ...core.finding import Finding
 from ...engines.mujoco.names import INTEGRATORS
 from ...engines.mujoco.reading import Reading
@@ -11,7 +11,7 @@ from ...stability.answer import CREEPS, Answer, Question, StepLimitRow, answer
 from ...stability.motion import Posture, posture_of, postures_of
 from ..options import StabilityOptions
 from ..setup import Setup
-from .tables import Runs, StabilityResult
+from .tables import Runs
 
 OF = "of_file"  # the template
 DEFAULT = "Euler"  # MuJoCo's integrator where a file states none
@@ -47,7 +47,7 @@ def answer_of(task: tuple[Posture, Question], reading: Reading) -> list[Answer |
 
 
 def add(
-    result: StabilityResult, found: list[Answer | str], quantity: str, is_alone: bool, error: float | None
+    result: Result, found: list[Answer | str], quantity: str, is_alone: bool, error: float | None
 ) -> None:
     """Rows, checks, and what is said: the answer first, then what a user must know of it, what helps, the other postures.
 
@@ -88,11 +88,11 @@ def add(
         )
 
 
-def tell(result: StabilityResult, kind: str, **values: Any) -> None:
+def tell(result: Result, kind: str, **values: Any) -> None:
     result.top.append(result.finding(kind, OF, **values))
 
 
-def tell_of_row(result: StabilityResult, row: StepLimitRow) -> None:
+def tell_of_row(result: Result, row: StepLimitRow) -> None:
     """What must be known of a posture to read its limits."""
     if row.judged_by == "divergence" or (row.judged_by == "speed" and row.by_itself == "in motion"):
         tell(result, "by_itself", row=row)
@@ -101,7 +101,7 @@ def tell_of_row(result: StabilityResult, row: StepLimitRow) -> None:
     result.find("posture_of_file", OF, row=row)
 
 
-def check(result: StabilityResult, row: StepLimitRow, quantity: str) -> None:
+def check(result: Result, row: StepLimitRow, quantity: str) -> None:
     """The check of the step, or of the period, in use at a posture."""
     if row.stable_at_file_dt is None:
         finite = "at fine steps the push is not survived either"
@@ -116,7 +116,7 @@ def check(result: StabilityResult, row: StepLimitRow, quantity: str) -> None:
     result.check(row.posture, quantity, row.used_s, limit, "s", note, about=About.STEP)
 
 
-def headline(result: StabilityResult) -> Finding | None:
+def headline(result: Result) -> Finding | None:
     """Whether the step in use is stable, at the posture that the answer and its table are of."""
     row = next((row for row in result.tables["step_limits"] if row.integrator == row.file_integrator), None)
     return None if row is None or row.stable_at_file_dt is None else result.finding("headline", OF, row=row)

@@ -1,7 +1,7 @@
-"""The rows of the tables of stability, its result, and the methods of both engines that they are of."""
+"""The rows of the tables of stability, and the methods of both engines that they are of."""
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from ...core.check import Result
@@ -71,17 +71,11 @@ class ClaimRow(OfMethod):
     run: float | None = column("s", optional=True)
 
 
-@dataclass
-class StabilityResult(Result):
-    centres: tuple[str, ...] = ()  # stable postures of the arm
-    schemes: dict[tuple[str, str], str] = field(default_factory=dict)  # by engine and method
-
-
 class Runs(NamedTuple):
     """Runs that have begun, each a list of rows, and what judges the rows of all."""
 
     rows: Iterable[list[Any]]
-    judge: Callable[[StabilityResult, list[Any]], None]
+    judge: Callable[[Result, list[Any]], None]
 
 
 def methods_of(engines: Mapping[str, Engine], schemes: tuple[str, ...] = ()) -> tuple[Method, ...]:
