@@ -4,6 +4,7 @@ A second run with another form of the equations and another order gives the accu
 for a stiff robot, the reference is a run in doubles of order 8. Halving its steps gives its accuracy.
 """
 
+import io
 from functools import lru_cache
 from itertools import product
 from typing import NamedTuple
@@ -11,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tmt
+from tmt.compiled import store
 from tmt.exact.motion import Path, TooManySteps, truth
 from tmt.methods import METHODS, RungeKutta
 
@@ -18,7 +20,6 @@ from ..core.finding import Finding
 from ..robots import Robot
 from ..robots.case import Case
 from ..robots.coordinates import Coordinates, rates_at
-from .kept import kept
 
 State = tuple[float, ...]
 RECORDS = 64  # states of a run, without its start
@@ -70,13 +71,17 @@ def reference(case: Case) -> Reference:
 def in_pairs(
     tree: tmt.Tree, q: State, v: State, tau: State, dt: float, steps: int, every: int
 ) -> tuple[Path, float]:
-    """`truth` of a motion, computed once and kept."""
+    """`truth` of a motion, computed once and kept in tmt's folder by its rules, see tmt.compiled.store."""
 
-    def computed() -> list[np.ndarray]:
+    def computed() -> bytes:
         path, apart = truth(tree, q, v, tau, dt, steps, every)
-        return [*map(np.array, (*path, apart))]
+        file = io.BytesIO()
+        np.savez(file, *path, apart)
+        return file.getvalue()
 
-    high, low, count, apart = kept(computed, tree, "pairs", (q, v, tau, dt, steps, every))
+    content = store.stored(computed, ".npz", tree, "pairs", (q, v, tau, dt, steps, every))
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        high, low, count, apart = arrays.values()
     return Path(high, low, int(count)), float(apart)
 
 
