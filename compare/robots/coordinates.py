@@ -149,11 +149,6 @@ def free_joints(tree: Tree) -> list[int]:
     return free
 
 
-def floats(tree: Tree) -> bool:
-    """Whether a joint to the world is free: such a robot has no rest under gravity."""
-    return any(tree.parent[i] == -1 for i in free_joints(tree))
-
-
 def rates_at(tree: Tree, q: np.ndarray) -> tuple[float, float]:
     """The fastest decay rate by damping and the fastest frequency by springs at q (nq,), 1/s."""
     inertia, _ = mass_matrix_and_bias(tree, q.tolist(), [0.0] * tree.coordinates.nv)

@@ -88,11 +88,6 @@ def random(robot: Robot, states: int, exact_states: int, seed: int = SEED) -> Sa
     return Sample(robot.tree, "random states", q, speeds, torques, exact_states, notes=tuple(notes))
 
 
-def seconds(robot: Robot) -> float:
-    """Duration of all quantities of a state with 50 digits, s; measured for 3 to 35 speeds, +-1/3."""
-    return 3e-3 + 3.4e-5 * robot.coordinates.nv**2 * len(robot.tree.mass)
-
-
 def largest_speeds_and_torques(robot: Robot) -> np.ndarray:
     """The largest random speeds, rad/s, and torques, N m, (2, nv): 10 each for a robot without ranges.
 

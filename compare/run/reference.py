@@ -60,17 +60,12 @@ class Reference(NamedTuple):
         return block("run", "subject", kind=self.kind, file=file, other=other)
 
     @property
-    def matched(self) -> str:
-        return f"joints matched: {', '.join(self.renamed)}" if self.renamed else ""
-
-    @property
     def lines(self) -> tuple[str, ...]:
         """The first lines of the report."""
         other = REFERENCES.get(self.kind, self.source.removesuffix(":"))
-        first = f"reference: {self.kind}; {self.file} compared with {other}"
-        return tuple(
-            in_one_line(line) for line in (first, self.matched, *self.otherwise, *self.remarks) if line
-        )
+        lines = [f"reference: {self.kind}; {self.file} compared with {other}"]
+        lines += [f"joints matched: {', '.join(self.renamed)}"] if self.renamed else []
+        return tuple(map(in_one_line, (*lines, *self.otherwise, *self.remarks)))
 
 
 class Compared(NamedTuple):

@@ -56,7 +56,6 @@ EDITS = (
     ("states", "largest_speeds_and_torques", "high - low", "high", "a speed passes the end of its range in a second"),
     ("robots.coordinates", "Coordinates.random", "limits or _1", "_1", "random states lie beyond the ranges of joints"),
     ("robots.coordinates", "free_joints", "not any(_1)", "True", "three slides and a ball apart are free"),
-    ("robots.coordinates", "floats", "tree.parent[i] == -1", "True", "what is free on an arm floats"),
     ("robots.file", "named_positions", "limits and _1", "limits", "the middle of a ball's range is no turn"),
     ("robots.file", "scenes_from", "-(weight + _1)", "-(weight - _1)", "springs push the other way"),
     ("robots.file", "servo_scenes", "least <= count", "True", "methods are compared with servos that no step follows"),
