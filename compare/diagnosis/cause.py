@@ -26,6 +26,7 @@ class Diagnosis(NamedTuple):
 
     differs: bool
     causes: tuple[Cause, ...] = ()  # of one rank, each explains everything; (): nothing does
+    closest: Cause | None = None  # where nothing explains everything: the single change that leaves least
     details: tuple[Detail, ...] = ()  # coefficients that differ, with both numbers
     entries: tuple[str, ...] = ()  # of Mbar and h that differ, "M[hip][knee]"
     compared: int = 0  # entries in all

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import product
 from math import inf
@@ -32,7 +33,9 @@ from .regression import several
 # states at which hypotheses are tried first: at least this number, and values for those of two numbers
 FEW, ENOUGH = 3, 40
 LARGE = 7e7  # times the tolerance of 64 eps: 1e-6 of the scale
-NEAR, PARTIAL = 2, 0.7  # conventions with which another cause is sought, and what they leave at most
+NEAREST = 0.05  # of the difference: what leaves more is not near
+NEAR = 2  # conventions with which another cause is sought, and single changes of which the nearest is told
+PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 IN_PART, CONVENTION_IN_PART = 0.12, 0.32  # costs of a slip, of a convention in some parts alone
 IN_PARTS = {  # how the parts in which alone a slip was made are said
     ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
@@ -86,6 +89,7 @@ class Explanations:
         self.known = [name for name, part in parts.items() if known[:, part].any()]
         self.differing = [name for name, part in parts.items() if self.off[part].any()]
         self.is_finished = True
+        self.near: list[tuple[Kind, Fitted]] = []  # single changes that leave little at a few states
         self.families: dict[Kind, Family] = {}
         self.listed: dict[Kind, list[Hypothesis]] = {}
 
@@ -108,7 +112,10 @@ class Explanations:
         if causes:
             return found._replace(causes=ranked(distinct(sorted(causes, key=self.cost))), seconds=seconds)
         details = self.given.details() if layout.qdd is None else ()
-        return found._replace(details=details, seconds=seconds)
+        found = found._replace(details=details, seconds=seconds)
+        with suppress(OutOfTime):
+            return found._replace(closest=self.closest() if self.is_finished else None)
+        return found
 
     def named(self, parts: Sequence[str]) -> tuple[str, ...]:
         return tuple(self.at_rest if part == "gravity" else part for part in parts)
@@ -118,6 +125,14 @@ class Explanations:
 
     def said(self, fits: Iterable[Fitted]) -> Iterator[Cause]:
         return causes_of(fits, *self.joints)
+
+    def closest(self) -> Cause | None:
+        """The single change that leaves least, if that is little."""
+        near = sorted(self.near, key=lambda found: found[1].left_over)[:NEAR]
+        those = [one for kind, fit in near for one in self.at_all(kind, fit.hypotheses)]
+        fits = self.search.alone(self.search.expanded(those)) if those else []
+        closest = min(fits, key=lambda fit: fit.left_over, default=None)
+        return closest.cause if closest and closest.left_over < NEAREST and closest.is_possible else None
 
     def stages(self) -> Iterator[list[Cause]]:
         """Explanations of everything: the natural ones of each stage, if there are any; then the others.
@@ -212,6 +227,9 @@ class Explanations:
         for kind in kinds:
             fits = few.alone(self.family(kind), entries is None)
             near = [fit.hypotheses[0] for fit in fits if fit.ratio <= 1.0]
+            if entries is None and kind in FIRST:
+                places = ((fit, fit.hypotheses[0]) for fit in fits if fit.left_over < NEAREST)
+                self.near += ((kind, fit) for fit, one in places if one.is_open and one.cause.kind != "whole")
             if near:
                 those = every.expanded(self.at_all(kind, near))
                 yield from explaining(every.alone(those, entries is None))

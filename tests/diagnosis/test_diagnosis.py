@@ -95,7 +95,7 @@ def test_what_nothing_explains_names_the_entries():
     given = added(1, np.sin(3.0 * Q[:, 0]))
     given[:, 8] += np.cos(5.0 * Q[:, 1]) * QD[:, 2] ** 3
     found = diagnosis(given, seconds=1.0)
-    assert found.differs and found.causes == ()
+    assert found.differs and found.causes == () and found.closest is None
     assert found.entries == ("M[alpha][beta]", "h[gamma]")
 
 
@@ -205,6 +205,13 @@ def test_a_slip_in_one_part_of_M_comes_before_unusual_factors_of_other_terms(add
 ])  # fmt: skip
 def test_another_function_of_an_angle_is_named_with_its_coefficient(added, place, explains):
     assert (place, explains) in [(cause.place, cause.explains) for cause in told(added).causes]
+
+
+@pytest.mark.parametrize("size, is_near", [(0.02, True), (0.05, False)])
+def test_the_nearest_cause_is_told_if_it_leaves_less_than_a_twentieth(size, is_near):
+    """Beside 0.4 in one entry, of which root 1/2 times the size is left."""
+    closest = told({M00: 0.4 + size * np.sin(3.0 * KNEE)}).closest
+    assert 0.02 < closest.left_over < 0.05 if is_near else closest is None
 
 
 @pytest.mark.parametrize("factor, is_cause", [(0.45, False), (0.5, True)])

@@ -22,7 +22,7 @@ INERTIA = (("xx", 0, 0), ("yy", 1, 1), ("zz", 2, 2), ("xy", 0, 1), ("xz", 0, 2),
 # costs: a force of another joint, a force in h, damping of all joints, the zero of a joint
 CROSS, IN_BIAS, OF_ALL, ZERO = 0.3, 0.2, 0.1, 0.05
 ONE = np.array(1.0)
-OF_FORCES = ("N m s/rad", "N m/rad", "N m")  # units of damping, stiffness and a force
+OF_FORCES = ("N m s/rad", "N m/rad", "N m", "rad")  # units of damping, stiffness, a force, a rest position
 OF_SLIDES = {"N m s/rad": "N s/m", "N m/rad": "N/m", "N m": "N", "kg m2": "kg", "rad": "m"}  # units
 
 
@@ -63,24 +63,20 @@ def forces(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[Hypothesis
     """Damping, spring, friction and a constant force of each joint, and damping of all together."""
     names = Coordinates(tree.joint_names, tree.kind).speeds
     for i, joint in enumerate(tree.coordinates.joints):
-        of_damping, of_stiffness, of_force = (unit_of(unit, joint.kind) for unit in OF_FORCES)
+        of_damping, of_stiffness, of_force, of_angle = (unit_of(unit, joint.kind) for unit in OF_FORCES)
         for v in range(joint.qd.start, joint.qd.stop):
-            name, speed, at_joint = names[v], qd[:, v : v + 1], np.eye(qd.shape[1])[v]
-            constant = np.ones_like(speed) * at_joint
-            has_spring = joint.kind != "ball" and tree.stiffness[i] > 0.0
-            column = speed * at_joint
-            yield number(f"damping of {name}", tree.damping[v], of_damping, column=column, least=0.0)
-            yield number(f"friction of {name}", 0.0, of_force, column=np.sign(column), least=0.0)
+            name, speed, one = names[v], qd * np.eye(qd.shape[1])[v], 0.0 * qd + np.eye(qd.shape[1])[v]
+            constant = number(f"constant force at {name}", 0.0, of_force, column=one)
+            yield number(f"damping of {name}", tree.damping[v], of_damping, column=speed, least=0.0)
+            yield number(f"friction of {name}", 0.0, of_force, column=np.sign(speed), least=0.0)
             if joint.kind != "ball":
-                rest = tree.rest[joint.q.start] if has_spring else tree.reference[i]
-                column = (q[:, joint.q] - rest) * at_joint
-                stiffness = tree.stiffness[i]
-                yield number(f"stiffness of {name}", stiffness, of_stiffness, column=column, least=0.0)
-            if has_spring:
-                pull, unit = -tree.stiffness[i] * constant, unit_of("rad", joint.kind)
-                yield number(f"springref of {name}", rest, unit, column=pull)
-            else:
-                yield number(f"constant force at {name}", 0.0, of_force, column=constant)
+                stiffness, rest = tree.stiffness[i], tree.reference[i]
+                if stiffness > 0.0:
+                    rest = tree.rest[joint.q.start]
+                    constant = number(f"springref of {name}", rest, of_angle, column=-stiffness * one)
+                moved = (q[:, joint.q] - rest) * one
+                yield number(f"stiffness of {name}", stiffness, of_stiffness, column=moved, least=0.0)
+            yield constant
     yield from forces_of_others(tree, q, qd)
     if len(tree.joint_names) > 1:
         yield number("damping added to every joint", 0.0, "N m s/rad", OF_ALL, column=qd, least=0.0)
@@ -90,16 +86,16 @@ def forces_of_others(tree: tmt.Tree, q: np.ndarray, qd: np.ndarray) -> Iterator[
     """Forces at a hinge or slide of the speed or displacement of another one, or of the cube of its own."""
     straight = [(i, joint) for i, joint in enumerate(tree.coordinates.joints) if joint.kind != "ball"]
     for (i, joint), (k, other) in product(straight, straight) if len(straight) <= MOST_SPEEDS else ():
-        of_other, unit = tree.joint_names[k], "m" if other.kind == "slide" else "rad"
-        force, at_joint = unit_of("N m", joint.kind), np.eye(qd.shape[1])[joint.qd.start]
-        moved = q[:, other.q] - tree.reference[k]
-        laws = [(f"{of_other}^3", f"{force}/{unit}3", moved**3)]
-        if i != k:
-            laws = [(f"the speed of {of_other}", f"{force} s/{unit}", qd[:, other.qd])]
-            laws.append((of_other, f"{force}/{unit}", moved))
+        name, unit, force = tree.joint_names[k], unit_of("rad", other.kind), unit_of("N m", joint.kind)
+        moved, speed = q[:, other.q] - tree.reference[k], qd[:, other.qd]
+        laws = [(f"the speed of {name}", f"{force} s/{unit}", speed), (name, f"{force}/{unit}", moved)]
+        if i == k:
+            laws = [(f"{name}^3", f"{force}/{unit}3", moved**3)]
         for what, of_number, column in laws:
-            place = f"force at {tree.joint_names[i]} of {what}"
-            yield number(place, 0.0, of_number, CROSS, "cross", column=column * at_joint)
+            column = column * np.eye(qd.shape[1])[joint.qd.start]
+            yield number(
+                f"force at {tree.joint_names[i]} of {what}", 0.0, of_number, CROSS, "cross", column=column
+            )
 
 
 def forces_in_bias(equations: Equations) -> Iterator[Hypothesis]:

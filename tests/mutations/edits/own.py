@@ -50,6 +50,7 @@ EDITS = (
     ("diagnosis.fit", "Search.at_zero", "ratio <= 1.0", "False", "a double root is found to half the digits"),
     ("diagnosis.fit", "Fitted.explains", "acts or _1", "True", "a number that does nothing is one of two"),
     ("diagnosis.forces", "LeftOver.options", "slack - self.springs", "self.springs - slack", "springs at rest at zero push back"),
+    ("diagnosis.search", "NEAREST", "0.05", "0.5", "what leaves half of the difference is near"),
     ("diagnosis.hypothesis", "is_written", "[x, *ratios]", "[x]", "a round ratio is none"),
     ("diagnosis.pairs", "of_slips", "squares[:, None] - _1", "squares[:, None] + 0.0 * _1", "no number is found beside a slip"),
     ("diagnosis.search", "IN_PART", "0.12", "2.0", "no slip is in a part alone"),
