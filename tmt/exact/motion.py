@@ -35,7 +35,7 @@ MOST_LITERAL = 40  # speeds: the literal form of a tree of more takes minutes to
 TOLERANCE = 1e-33  # of the last terms in a step, in units of 1 + |value|
 MOST_OPERATIONS = 20_000_000  # of all steps of a run: some 20 s
 BESIDE = 100  # operations, as long as the rest of a step takes
-SEEN = 200  # steps by which it is seen whether a run would take more
+SEEN, PART_SEEN = 200, 20  # steps, or this part of the most, by which it is seen whether a run would take more
 OPERATIONS = {
     "+": [series.ADD], "-": [series.SUBTRACT], "neg": [series.NEGATIVE], "*": [series.MULTIPLY],
     "/": [series.DIVIDE], "sqrt": [series.ROOT], "sign": [series.SIGN],
@@ -121,7 +121,7 @@ def followed(
                 error = TooManySteps(f"at t = {float(t):.3g} s {why}")
             return np.array(path), count, error
         left, count = float((times[-1] - t) / Fraction(min(step, 2.0 * float(times[-1])))), count + 1
-        if count - 1 + left > most and count >= min(SEEN, most):
+        if count - 1 + left > most and count >= min(SEEN, most // PART_SEEN):
             why = f"a series takes steps of {step:.1e} s, and in {float(times[-1]):g} s more than {most}"
             return np.array(path), count, TooManySteps(f"at t = {float(t):.3g} s {why}")
         end = times[-1] if step == math.inf else t + Fraction(step)

@@ -50,9 +50,10 @@ def loops(setup: Setup) -> list[Loop]:
     of_mujoco = runs.loops(dynamics, *(values[0] for values in states)).items()
     ready: list[Loop] = [(EvaluationRow(FORWARD, name), run) for name, run in of_mujoco]
     compiled = Evaluator(tree, "acceleration")
+    ways = ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True))[: 1 if setup.is_quick else 2]
     for count in dict.fromkeys((FEW, many)):
         out, some = np.empty((count, compiled.size)), [values[:count] for values in states]
-        for name, in_lanes in ((ONE_BY_ONE, False), (SIDE_BY_SIDE, True)):
+        for name, in_lanes in ways:
             row = EvaluationRow(FORWARD, name, count, operations=compiled.operations)
             ready.append((row, partial(repeat, partial(compiled.fill, in_lanes, out, *some))))
     for row, run in ready:
