@@ -79,7 +79,7 @@ class StepLimitRow(Row):
 
     @property
     def is_damped(self) -> bool:
-        return self.kept is not None and self.kept < DAMPED
+        return self.outcome != "diverges" and self.kept is not None and self.kept < DAMPED
 
     @property
     def used_s(self) -> float:

@@ -1,5 +1,7 @@
 """The longest stable step after a push: against closed forms, MuJoCo's derivative and plain runs with other signs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers import pushed_models as models
@@ -18,6 +20,7 @@ from helpers.pushed_models import (
 )
 
 import compare
+from compare.stability.answer import StepLimitRow
 
 SERVO_WITHOUT_KV = '<position joint="turn" kp="400"/>'
 
@@ -177,3 +180,16 @@ def test_a_rod_that_tumbles_as_it_falls_through_air_is_as_stable_as_at_fine_step
     <keyframe><key qpos="0 0 1 1 0 0.2 0" qvel="0.2 -0.1 -0.4 -0.2 -0.3 0.5"/></keyframe></mujoco>"""
     row = euler(text)
     assert row.judged_by == "speed" and row.stable_at_file_dt and row.fails_at_s is None
+
+
+def test_a_run_that_diverges_is_not_said_to_be_damped():
+    row = StepLimitRow(
+        posture="home",
+        integrator="Euler",
+        push_rad_per_s=0.1,
+        kept=0.1,
+        outcome="moves",
+        file_dt_s=1e-3,
+        file_integrator="Euler",
+    )
+    assert row.is_damped and not replace(row, outcome="diverges").is_damped

@@ -33,9 +33,12 @@ FORMS: dict[str, Callable[..., Any]] = {
 ORDER, OTHER_ORDER = 40, 34
 MOST_LITERAL = 40  # speeds: the literal form of a tree of more takes minutes to trace
 TOLERANCE = 1e-33  # of the last terms in a step, in units of 1 + |value|
-MOST_OPERATIONS = 20_000_000  # of all steps of a run: some 20 s
+MOST_OPERATIONS = 5_000_000  # of all steps of a run: some 5 s
 BESIDE = 100  # operations, as long as the rest of a step takes
-SEEN, PART_SEEN = 200, 20  # steps, or this part of the most, by which it is seen whether a run would take more
+SEEN, PART_SEEN = (
+    200,
+    20,
+)  # steps, or this part of the most, by which it is seen whether a run would take more
 OPERATIONS = {
     "+": [series.ADD], "-": [series.SUBTRACT], "neg": [series.NEGATIVE], "*": [series.MULTIPLY],
     "/": [series.DIVIDE], "sqrt": [series.ROOT], "sign": [series.SIGN],
