@@ -224,7 +224,7 @@ class MatlabProgram(Program):
         self.run(*found("octave-cli", "octave"), "--norc", "--quiet", "_states.m")
         columns = *shape[bool(row.parts) :], len(states[0])
         arrays = [np.fromfile(self.folder / f"{r}.bin").reshape(columns, order="F") for r in results]
-        return np.moveaxis(arrays, -1, 0).reshape(-1, *shape)
+        return np.moveaxis(np.array(arrays), -1, 0).reshape(-1, *shape)
 
 
 PROGRAMS: dict[str, type[Program]] = {

@@ -29,18 +29,15 @@ def tree_of(name) -> Tree:
 
 def planar(n) -> Tree:
     """A pendulum of n links."""
-    inertia = [np.diag([0.02, 0.021, 0.003])] * n
-    return Tree(
-        [f"joint{i}" for i in range(n)], range(-1, n - 1), [(0, 0, -0.5 * (i > 0)) for i in range(n)], [(0, 1, 0)] * n, [0.0] * n,
-        [f"link{i}" for i in range(n)], range(n), [1.0] * n, [(0, 0, -0.25)] * n, inertia, (0, 0, -9.81),
-    )  # fmt: skip
+    link = {"axis": (0, 1, 0), "mass": 1.0, "com": (0, 0, -0.25), "inertia": (0.02, 0.021, 0.003)}
+    offsets = [(0, 0, -0.5 * (i > 0)) for i in range(n)]
+    return Tree.from_joints([tmt.Joint(f"joint{i}", offset=x, **link) for i, x in enumerate(offsets)])
 
 
 def cart_pole(reference=0.0) -> Tree:
-    return Tree(
-        ["slider", "hinge"], (-1, 0), np.zeros((2, 3)), ((1, 0, 0), (0, 1, 0)), (0.0, 0.0), ["cart", "pole"], (0, 1), (1.0, 0.1),
-        ((0, 0, 0), (0, 0, 0.5)), np.zeros((2, 3, 3)), (0, 0, -9.81), ["slide", "hinge"], (0.0, 0.02), reference=(0.1, reference),
-    )  # fmt: skip
+    cart = tmt.Joint("slider", "slide", axis=(1, 0, 0), mass=1.0)
+    pole = tmt.Joint("hinge", axis=(0, 1, 0), mass=0.1, com=(0, 0, 0.5), armature=0.02)
+    return Tree.from_joints([cart, pole], reference=(0.1, reference))
 
 
 def assert_right(symbols, tree, rng, states=100):
@@ -75,7 +72,7 @@ def test_the_numbers_are_those_of_the_tree(make, named, rng):
 
 def test_a_double_pendulum_has_the_form_of_textbooks():
     symbols = symbolic(planar(2))
-    names = "m_link0 m_link1 l_1 c_link0 c_link1 I_link0_yy I_link1_yy q_joint1 qd_joint0 qd_joint1"
+    names = "m_joint0 m_joint1 l_1 c_joint0 c_joint1 I_joint0_yy I_joint1_yy q_joint1 qd_joint0 qd_joint1"
     m1, m2, l1, c1, c2, I1, I2, q2, qd1, qd2 = sympy.symbols(names)
     M, h = symbols.entries["mass_matrix"], symbols.entries["bias"] - symbols.entries["gravity_balance"]
     assert M[0] == m1 * c1**2 + I1 + I2 + m2 * (l1**2 + c2**2 + 2 * l1 * c2 * sympy.cos(q2))
