@@ -47,7 +47,7 @@ class Runner:
         q, qd, tau, info, *more = arrays
         carried, stop = more or (self.carried(len(q), dt), np.zeros(1, np.int64))
         held = q, qd, tau, info, carried, stop
-        of_q, of_qd, of_tau, *others = map(address, held)
+        of_q, of_qd, of_tau, *others = (x.__array_interface__["data"][0] for x in held)
         arguments = of_q, of_qd, of_tau, dt, tolerance, *others, every, q.shape[1], len(q)
         function = self.compiled(width)
 
@@ -99,10 +99,6 @@ class Runner:
             return codes, int(info[:, 2].sum())
         taken = int(np.where(codes[:, 0], codes[:, 1] + 1, steps).sum())
         return codes, taken * self.stepping.stages
-
-
-def address(array: Array) -> int:
-    return array.__array_interface__["data"][0]
 
 
 def runner_of(tree: Tree, name: str) -> Runner:

@@ -36,7 +36,6 @@ from .vectors import (
     Values,
     Vector,
     minus,
-    plus,
     total,
     weighted,
 )
@@ -218,15 +217,6 @@ def spring_torque(tree: Mechanism, q: Scalars) -> Values:
     return [stiffness * x for stiffness, x in from_rest(tree, q)]
 
 
-def fed_back(tree: Mechanism, q: Scalars, qd: Scalars) -> Values:
-    """P q + S qd (nv, N m or N), which a linear controller takes off; no entry of P is that of a ball."""
-    positions = [q[i] for i in tree.coordinates.first_positions]
-    result = [0.0] * len(qd)
-    for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
-        result = plus(result, [weighted(row, values) for row in gain]) if gain else result
-    return result
-
-
 def with_diagonal(matrix: Sequence[Scalars], diagonal: Scalars) -> Rows:
     rows = [list(row) for row in matrix] or [[0.0] * len(diagonal) for _ in diagonal]
     for i, x in enumerate(diagonal):
@@ -240,8 +230,9 @@ def reduced_force(tree: Mechanism, h: Scalars, q: Scalars, qd: Scalars, tau: Sca
     Qbar = [t - d * v - hi for t, d, v, hi in zip(tau, tree.damping, qd, h)]
     if tree.has_springs:
         Qbar = minus(Qbar, spring_torque(tree, q))
-    if tree.has_gains:
-        Qbar = minus(Qbar, fed_back(tree, q, qd))
+    positions = [q[i] for i in tree.coordinates.first_positions]  # no entry of P is that of a ball
+    for gain, values in ((tree.position_gain, positions), (tree.speed_gain, qd)):
+        Qbar = minus(Qbar, [weighted(row, values) for row in gain]) if gain else Qbar
     return Qbar
 
 

@@ -93,13 +93,12 @@ def sections(symbolic: Symbolic) -> list[Section]:
             gravity = symbolic.entries["gravity_balance"]
             symbols = [sympy.Symbol(f"G_{{{i + 1}}}") for i in range(len(rows))]
             rows = [[h - G + symbol if G else h] for (h,), G, symbol in zip(rows, gravity, symbols)]
-        rows = [[entry.xreplace(rounded(entry)) for entry in row] for row in rows]
+        rows = [
+            [x.xreplace({n: sympy.Float(n, DIGITS) for n in x.atoms(sympy.Float)}) for x in row]
+            for row in rows
+        ]
         result.append(Section(*TITLES[name], rows))
     return result
-
-
-def rounded(expression: Expression) -> dict[Expression, Expression]:
-    return {number: sympy.Float(number, DIGITS) for number in expression.atoms(sympy.Float)}
 
 
 def tables(symbolic: Symbolic) -> list[list[Row]]:

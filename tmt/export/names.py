@@ -131,7 +131,10 @@ class Names:
         def lifted(values: Any) -> Any:
             return tuple(map(lifted, values)) if isinstance(values, list) else scalar(values)
 
-        axes = [axis if self.is_exact else unit(axis) for axis in self.axes]
+        axes = self.axes
+        if not self.is_exact:
+            many = [sympy.Matrix([sympy.Rational(x) for x in axis]) for axis in axes]
+            axes = [list(axis.normalized().evalf(DIGITS)) for axis in many]
         numbers = {"axis": axes, "offset": self.offsets, "mass": self.mass, "com": self.com}
         numbers |= {"inertia": self.inertia, "gravity": self.gravity}
         fields = vars(self.source) | {name: lifted(values) for name, values in numbers.items()}
@@ -162,10 +165,6 @@ def without_tiny(values: Sequence[float]) -> list[float]:
 
 def number(value: float) -> Expression:
     return sympy.Integer(int(value)) if float(value).is_integer() else sympy.Float(value)
-
-
-def unit(axis: Iterable[Expression]) -> list[Expression]:
-    return list(sympy.Matrix([sympy.Rational(x) for x in axis]).normalized().evalf(DIGITS))
 
 
 def direction(vector: Sequence[Expression]) -> str:

@@ -83,8 +83,12 @@ def nested(item: Any) -> Any:
 def states(model: Mechanism, **arrays: ArrayLike) -> list[Array]:
     """Arrays (..., nq), q, or (..., nv) of one batch shape, after a check of type, shape and values."""
     checked = {name: _state(model, name, values) for name, values in arrays.items()}
-    if "q" in checked:
-        _check_quaternions(model, checked["q"])
+    for ball in model.coordinates.balls if checked.get("q", np.empty(0)).size else ():
+        quaternions = checked["q"][..., ball.q].reshape(-1, 4)
+        off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
+        name = model.joint_names[model.coordinates.joints.index(ball)]
+        worst, is_close = quaternions[np.argmax(off)].tolist(), off.max() <= CLOSE_TO_ONE
+        require(is_close, f"q of {name!r}", worst, "a quaternion w, x, y, z of length 1 is")
     try:
         batch = np.broadcast_shapes(*(array.shape[:-1] for array in checked.values()))
     except ValueError:
@@ -111,19 +115,6 @@ def _state(model: Mechanism, name: str, values: ArrayLike) -> Array:
     return array
 
 
-def _check_quaternions(model: Mechanism, q: Array) -> None:
-    for name, joint in zip(model.joint_names, model.coordinates.joints):
-        if joint.kind != "ball":
-            continue
-        quaternions = q[..., joint.q].reshape(-1, 4)
-        off = np.abs(np.linalg.norm(quaternions, axis=-1) - 1.0)
-        if off.size:
-            worst = quaternions[np.argmax(off)].tolist()
-            require(
-                off.max() <= CLOSE_TO_ONE, f"q of {name!r}", worst, "a quaternion w, x, y, z of length 1 is"
-            )
-
-
 def positive(name: str, value: Any, kind: str) -> float:
     try:
         number = float(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
@@ -145,7 +136,11 @@ def paths(runs: int, steps: int, every: int, nq: int, nv: int) -> tuple[Array, A
     records = steps // every + 1
     size = runs * records * (nq + nv) * 8
     try:
-        if size > ALWAYS_FREE and size > memory():
+        memory = float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):  # it is not known
+        memory = math.inf
+    try:
+        if size > max(ALWAYS_FREE, memory):
             raise MemoryError
         return np.empty((runs, records, nq)), np.empty((runs, records, nv))
     except MemoryError:
@@ -154,11 +149,3 @@ def paths(runs: int, steps: int, every: int, nq: int, nv: int) -> tuple[Array, A
             f"steps is {shown(steps)}: with {nq} positions and {nv} speeds the states of {runs} runs would "
             f"take {needed} of memory, more than there is; with every=k each k-th of them is kept"
         ) from None
-
-
-def memory() -> float:
-    """The memory of this machine, B; infinite where it is not known."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, OSError, ValueError):
-        return math.inf
