@@ -55,9 +55,8 @@ class Model(ReadModel):
         if (model.joint_coord_count, model.joint_dof_count) != (compiled.nq, compiled.nv):
             raise OtherJoints(model.joint_dof_count, compiled.nv)
         places, self.starts, self.reference, nq, nv = joint_places(compiled), {}, np.zeros(compiled.nq), 0, 0
-        for name in sorted(
-            places, key=lambda n: (compiled.jnt_bodyid[places[n].joint], places[n].kind != "slide")
-        ):
+        bodies = {name: int(compiled.jnt_bodyid[place.joint]) for name, place in places.items()}
+        for name in sorted(places, key=lambda name: (bodies[name], places[name].kind != "slide")):
             k, place = file.names.index(name), places[name]
             self.starts[k] = nq, nv
             if kind_of(compiled, place.joint) in ("hinge", "slide"):
@@ -153,10 +152,8 @@ class Model(ReadModel):
         self.state, self.next = self.next, self.state
 
     def step_alone(self, course: Course) -> Callable[[], object]:
-        is_damped = (
-            self.used["damping"][self.order.of_free].any() or self.used["stiffness"][self.order.of_ball].any()
-        )
-        if course.method == FEATHERSTONE and is_damped:
+        lacking = self.used["damping"][self.order.of_free], self.used["stiffness"][self.order.of_ball]
+        if course.method == FEATHERSTONE and np.concatenate(lacking).any():
             raise EngineError("Featherstone has no springs of ball joints and no damping of free joints")
         at = self.order.state(course.q, course.v)
         self.start(at, at.force(course.tau), acts=True)

@@ -32,11 +32,11 @@ class Tmt(Engine):
 
     @property
     def methods(self) -> Mapping[str, Method]:
-        return {
-            name: Method(self.name, name, None if method.adaptive else method.order, name, method.adaptive)
-            for name, method in tmt.METHODS.items()
-            if name not in self.left_out
-        }
+        methods = {}
+        for name in [name for name in tmt.METHODS if name not in self.left_out]:
+            order, is_adaptive = tmt.METHODS[name].order, tmt.METHODS[name].adaptive
+            methods[name] = Method(self.name, name, None if is_adaptive else order, name, is_adaptive)
+        return methods
 
     def methods_in(self, case: Case) -> Mapping[str, Method]:
         return Tmt({*FOR_SOME[1:], *self.methods}).methods if case.controller else self.methods

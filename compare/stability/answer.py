@@ -148,14 +148,12 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
         raise ValueError("nothing moves")
     period = question.control_period
     motion = motion_of(reading, posture, question.recorded, question.kp, question.kv, period is not None)
-    pushed = Pushed(
-        motion, question.dt, question.integrator, question.push, period or 0.0, question.delay or 0.0
-    )
+    times = period or 0.0, question.delay or 0.0
+    pushed = Pushed(motion, question.dt, question.integrator, question.push, *times)
     pushed.find_truth(PUSHES[-1] if question.drawn else USUAL)
-    found = Answer(
-        [row_of(pushed, name, question) for name in question.integrators], [], [], [], [], None, {}
-    )
-    row, own = found.rows[0], found.own
+    rows = [row_of(pushed, name, question) for name in question.integrators]
+    found = Answer(rows, [], [], [], [], None, {})
+    row, own = rows[0], found.own
     if question.drawn and row.judged_by == "rest" and period is None:
         for push in DRAWN:
             for name in question.integrators if push <= pushed.survived else ():
@@ -200,12 +198,8 @@ def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:
     verdict = pushed.verdict(trial)
     row.stable_up_to_s, row.fails_at_s = limit.stable_up_to, limit.fails_at
     row.moves_first = "" if limit.dof is None else joint_of(model, limit.dof)
-    row.end_speed_file_rad_per_s, row.apart, row.kept = (
-        known(verdict.speed),
-        known(verdict.apart),
-        verdict.kept,
-    )
-    row.stable_at_file_dt, row.outcome = verdict.holds, verdict.why or "holds"
+    row.end_speed_file_rad_per_s, row.apart = known(verdict.speed), known(verdict.apart)
+    row.stable_at_file_dt, row.outcome, row.kept = verdict.holds, verdict.why or "holds", verdict.kept
 
     def is_near(step: float) -> bool:
         tried = pushed.verdict(Trial(push, step, integrator))

@@ -1,11 +1,13 @@
 """The arm's equations of motion linearized about a posture that is held: its modes, and one step of a method there."""
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
 
 import tmt
 
+from ..engines import Engine, Method, Motion
 from ..robots import Robot
 from ..robots.case import Case
 
@@ -45,6 +47,15 @@ class Equilibrium:
         if self.rates[0].real > self.small:
             return "saddle"
         return "marginal" if np.abs(self.rates).min() <= self.small else "centre"
+
+    def run(
+        self, method: Method, engines: Mapping[str, Engine], tau: np.ndarray, dt: float, steps: int,
+        moved: np.ndarray | float = 0.0, v: np.ndarray | float = 0.0,
+    ) -> Motion:  # fmt: skip
+        """A run of a method from angles near the posture under constant torques, (..., n), at rest by default."""
+        q, v = (np.broadcast_to(values, tau.shape) for values in (self.q + moved, v))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return engines[method.engine].of(self.case).run(q, v, tau, dt, steps, method.name)
 
     def step(self, name: str, dt: np.ndarray | float) -> np.ndarray:
         """The amplification of a step of a method of tmt, (..., 2n, 2n); dt: s, (...)."""

@@ -124,10 +124,9 @@ def motion_of(
     if law is None and kp is None and kv is None:
         raise ValueError("it has no servo: state --kp and --kv of its motors")
     if law is None:
-        servos = program(model, state[place], data.actuator_length)
-        raise ValueError(
-            "it has no motor" + "; a program commands its servos without --kp and --kv" * bool(servos)
-        )
+        has_servos = program(model, state[place], data.actuator_length) is not None
+        more = "; a program commands its servos without --kp and --kv"
+        raise ValueError("it has no motor" + more * has_servos)
     if kp is not None or kv is not None:
         ideal = ideal._replace(model=with_law(law))
         ideal.state[place][law.places] = 0.0

@@ -206,9 +206,8 @@ class Pushed(Runs):
         more = MORE_WAYS if self.rests else MORE_WAYS // 2  # what falls is no more certain with more of them
         for why, way, dof, speed in self.further(trial, range(WAYS, WAYS + more)):
             if why:
-                self.tried[trial] = Verdict(
-                    why, way, dof, max(speed, verdict.speed), verdict.apart, verdict.kept
-                )
+                found = {"why": why, "way": way, "dof": dof, "speed": max(speed, verdict.speed)}
+                self.tried[trial] = verdict._replace(**found)
                 return False
         self.surely.add(trial)
         return True
@@ -253,9 +252,9 @@ class Pushed(Runs):
         if self.motion.program or len(self.motion.times):
             return None
         trial = Trial(self.push, dt, integrator)
-        way, fastest = (
-            self.verdict(trial).way,
+        fastest, way = (
             max(float(run.most.max()) for run in self.fine_runs(self.push)),
+            self.verdict(trial).way,
         )
         lasts = self.lasts * (1.0 if way < WAYS else SURELY)
         run = self.run(trial, way, max(FAST, 10.0 * fastest), lasts)

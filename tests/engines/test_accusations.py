@@ -190,11 +190,8 @@ def file_of(folder, text):
 
 def features_named(engine, path):
     """The features without which MuJoCo has what an engine has read."""
-    robot, result = (
-        compared_with("model", str(path)).robot,
-        EnginesResult("engines", tables={"engines_read": []}),
-    )
-    of = Outside(engine).of(robot.case())
+    robot, result = compared_with("model", str(path)).robot, EnginesResult("engines")
+    of, result.tables["engines_read"] = Outside(engine).of(robot.case()), []
     try:
         compare_numbers(result, robot, RECORDS[engine], of.file, of.reading)
     except OtherJoints as error:
@@ -207,9 +204,7 @@ def skip_unless_installed(engine):
         pytest.skip(f"{engine} is not installed")
 
 
-@pytest.mark.parametrize(
-    "kind, engine, text, ask, stated", CASES, ids=[f"{case[0]}-{case[1]}" for case in CASES]
-)
+@pytest.mark.parametrize("kind, engine, text, ask, stated", CASES, ids=[f"{a}-{b}" for a, b, *_ in CASES])
 def test_a_cause_is_confirmed_by_the_engine_itself(kind, engine, text, ask, stated, tmp_path):
     skip_unless_installed(engine)
     path = file_of(tmp_path, text)

@@ -63,10 +63,8 @@ def test_quantities_are_those_of_the_case_at_one_state_and_in_any_batch(engine, 
         assert_the_same(dynamics, case.tree, rng)
     for quantity in OF_TMT:
         arguments = state[: len(OF_TMT[quantity].takes)]
-        found, right = (
-            getattr(dynamics, quantity)(*arguments),
-            getattr(tmt, quantity)(case.tree, *arguments),
-        )
+        found = getattr(dynamics, quantity)(*arguments)
+        right = getattr(tmt, quantity)(case.tree, *arguments)
         assert engine == "mujoco" or np.allclose(found, right, rtol=1e-12, atol=1e-12), quantity
         if not isinstance(found, tuple):
             assert np.array_equal(getattr(dynamics, quantity)(*(x[2] for x in arguments)), found[2])

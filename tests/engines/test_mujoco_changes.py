@@ -40,14 +40,10 @@ def test_kv_of_every_servo_and_damper_changes_and_its_target_does_not(actuator, 
 
 
 FACTOR = 5.0
+NO_CONTACT = 'contype="0" conaffinity="0"'
 CONTACTS = {  # option, geoms, pair; whether there is a time constant to change
     "of geoms": ("", 'solref="0.01 1"', "", True),
-    "of a pair": (
-        "",
-        'contype="0" conaffinity="0"',
-        '<pair geom1="ball" geom2="floor" solref="0.01 1"/>',
-        True,
-    ),
+    "of a pair": ("", NO_CONTACT, '<pair geom1="ball" geom2="floor" solref="0.01 1"/>', True),
     "of the options": ('o_solref="0.01 1"><flag override="enable"/></option><option', "", "", True),
     "by stiffness and damping": ("", 'solref="-1000 -50"', "", False),
 }
@@ -108,9 +104,7 @@ def test_changes_are_of_a_copy_and_of_what_they_name():
     ('<motor joint="j"/>', {"kv": 2.0}, lambda q, v: -2.0 * v),
     ('<motor joint="j"/>', {}, None), ('<position joint="j" kp="20" kv="3"/>', {"kp": 7.0}, None),
 ])  # fmt: skip
-def test_a_program_has_the_law_of_the_servos_that_it_replaces_or_the_gains_that_are_given(
-    actuator, gains, exact
-):
+def test_a_program_has_the_law_of_the_servos_that_it_replaces_or_the_gains_given(actuator, gains, exact):
     model = mujoco.MjModel.from_xml_string(HINGE.format(actuator, ""))
     found = changes.program(model, np.array([0.5]), np.array([0.1]), **gains)
     assert (found is None) == (exact is None)

@@ -76,9 +76,8 @@ def test_inputs_of_a_roll_are_those_of_a_program_in_plain_steps():
 
 
 def test_a_run_ends_before_the_step_with_a_bad_number_and_stays_ended():
-    text = HINGE.format(
-        '<general joint="j" biastype="affine" biasprm="0 1e6 0"/>', '<key name="k" qpos="1"/>'
-    )
+    pushing = '<general joint="j" biastype="affine" biasprm="0 1e6 0"/>'
+    text = HINGE.format(pushing, '<key name="k" qpos="1"/>')
     stepper = Stepper(mujoco.MjModel.from_xml_string(text), 1.0, "Euler")
     start, speed, count = stepper.start("k", controls=[0.0]), 0.0, 0
     q = 1.0
@@ -171,6 +170,7 @@ def test_differences_are_one_sided_at_the_end_of_a_range():
 
 
 SERVO = '<position joint="j" kp="20" kv="1" {}/>'
+INTEGRATOR = '<intvelocity joint="j" kp="9" actrange="-1 1"/>'
 STARTS = {  # actuators, what the keyframe states; the control and the activation at the start
     "stated": (SERVO, 'ctrl="0.7"', 0.7, None),
     "a servo holds the posture": (SERVO, "", 0.4, None),
@@ -178,13 +178,8 @@ STARTS = {  # actuators, what the keyframe states; the control and the activatio
     "by its law": ('<general joint="j" gainprm="2" biastype="affine" biasprm="1 -20 -1"/>', "", 3.5, None),
     "a filter": (SERVO.format('timeconst="0.1"'), "", 0.4, 0.4),
     "a filter that is stated": (SERVO.format('timeconst="0.1"'), 'ctrl="0.7" act="0.2"', 0.7, 0.2),
-    "an integrator": ('<intvelocity joint="j" kp="9" actrange="-1 1"/>', "", 0.0, 0.4),
-    "an integrator that is stated": (
-        '<intvelocity joint="j" kp="9" actrange="-1 1"/>',
-        'act="0.1"',
-        0.0,
-        0.1,
-    ),
+    "an integrator": (INTEGRATOR, "", 0.0, 0.4),
+    "an integrator that is stated": (INTEGRATOR, 'act="0.1"', 0.0, 0.1),
     "a motor": ('<motor joint="j"/>', "", 0.0, None),
     "a velocity servo": ('<velocity joint="j" kv="2"/>', "", 0.0, None),
     "a muscle": ('<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/>', "", 0.0, 0.0),

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.files import assert_exact
+from models import PATHS
 
 import tmt
 from compare.engines import RECORDS, Setting
@@ -16,10 +17,7 @@ from compare.run.reference import compared_with
 ROOT = Path(__file__).parents[2]
 ENGINES = [name for name, record in RECORDS.items() if record.reads_file and not Outside(name).unavailable()]
 pytestmark = pytest.mark.parametrize("engine", ENGINES)
-ROBOTS = [
-    ROOT / "mjcf/arm.xml",
-    *(ROOT / f"tests/models/{name}.xml" for name in ("arm7", "quadruped", "pendulum_ball")),
-]
+ROBOTS = [ROOT / "mjcf/arm.xml", *(PATHS[name] for name in ("arm7", "quadruped", "pendulum_ball"))]
 BODY = '<inertial pos="{}" mass="{}" diaginertia="{}"/>'
 PENDULUM = f"""<mujoco model="m"><option gravity="0 0 -9.81"/><worldbody><body name="upper">
 <joint name="hip" axis="0 1 0" damping="0.1"/>

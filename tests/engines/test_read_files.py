@@ -42,18 +42,11 @@ def test_a_urdf_is_one_by_its_text_whatever_its_name(engine, name, floating, tmp
 
 @pytest.mark.skipif("drake" not in INSTALLED, reason="Drake is not installed")
 def test_a_joint_without_a_name_is_not_found_and_a_refusal_is_the_engines(tmp_path):
-    for text, error in (
-        (PART.replace('name="knee"', ""), OtherNames),
-        (PART.replace("<joint", '<joint type="ball"', 1), None),
-    ):
-        robot = robot_of(tmp_path / "robot.xml", f'<mujoco model="m"><worldbody>{text}</worldbody></mujoco>')
-        of = Outside("drake").of(robot.case())
-        if error:
-            with pytest.raises(error):
-                of.reading  # noqa: B018
-    nameless = robot_of(tmp_path / "nameless.xml", f"<mujoco><worldbody>{PART}</worldbody></mujoco>")
-    with pytest.raises(Unread, match="name"):
-        Outside("drake").of(nameless.case()).reading  # noqa: B018
+    unnamed = PART.replace('name="knee"', "")
+    for model, part, error in ((' model="m"', unnamed, OtherNames), ("", PART, Unread)):
+        robot = robot_of(tmp_path / "robot.xml", f"<mujoco{model}><worldbody>{part}</worldbody></mujoco>")
+        with pytest.raises(error, match="name" if error is Unread else "joint"):
+            Outside("drake").of(robot.case()).reading  # noqa: B018
 
 
 @pytest.mark.skipif("drake" not in INSTALLED, reason="Drake is not installed")
@@ -64,6 +57,5 @@ def test_damping_and_springs_act_in_drakes_runs(tmp_path):
     tau = np.linspace(0.3, -0.2, n)
     run, read = of.prepare(q, v, tau, Setting(0.5, 256), "RK5")
     motion, exact = read(run()), tmt.simulate(robot.tree, q, v, tau, 0.5 / 1024, 1024, "dopri8")
-    assert (
-        np.abs(motion.q[-1] - exact.q[-1]).max() < 1e-10 and np.abs(motion.v[-1] - exact.qd[-1]).max() < 1e-10
-    )
+    assert motion.q[-1] == pytest.approx(exact.q[-1], abs=1e-10)
+    assert motion.v[-1] == pytest.approx(exact.qd[-1], abs=1e-10)

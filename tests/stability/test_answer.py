@@ -52,10 +52,8 @@ def test_the_longest_period_of_a_program_is_that_of_a_plain_loop(delay):
 
 
 def test_the_files_servos_in_a_program_are_the_same_law():
-    of_file, of_motor = (
-        euler(hinge(), control_period=0.01),
-        euler(hinge(MOTOR), control_period=0.01, kp=KP, kv=KV),
-    )
+    of_file = euler(hinge(), control_period=0.01)
+    of_motor = euler(hinge(MOTOR), control_period=0.01, kp=KP, kv=KV)
     assert of_file.stable_up_to_s == of_motor.stable_up_to_s and of_file.controls == "program"
 
 

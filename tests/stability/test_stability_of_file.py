@@ -39,13 +39,8 @@ def full():
 
 
 def row(up_to=0.01, fails=0.0106, stable=True, posture="p", **more):
-    usual = {
-        "judged_by": "rest",
-        "outcome": "holds",
-        "by_itself": "rests",
-        "unit": "rad/s",
-        "survived_rad_per_s": 0.1,
-    }
+    usual = {"judged_by": "rest", "outcome": "holds", "by_itself": "rests", "unit": "rad/s"}
+    usual["survived_rad_per_s"] = 0.1
     return StepLimitRow(
         posture=posture, integrator="Euler", push_rad_per_s=0.1, stable_up_to_s=up_to, fails_at_s=fails,
         stable_at_file_dt=stable, file_dt_s=0.002, file_integrator="Euler", moves_first="knee", run_s=3.0, fine_dt_s=2.5e-4,
@@ -63,9 +58,8 @@ def test_a_quick_run_has_the_files_integrator_and_the_default_and_a_full_one_all
     assert {row.push_rad_per_s for row in tried if row.posture == "home"} >= {0.03, 0.1, 0.3}
     rows = [replace(row, outcome="moves") if row.integrator == "RK4" else row for row in tried]
     of_none = replace(full, tables=full.tables | {"stability_runs": rows})  # RK4 survives no push
-    (name, fig, _), (of_quick, *_) = [
-        draw() for of in (of_none, quick) for draw in stability.figures(of, None)
-    ]
+    drawn = [draw() for found in (of_none, quick) for draw in stability.figures(found, None)]
+    (name, fig, _), (of_quick, *_) = drawn
     assert {text.get_text() for text in fig.legends[0].texts} == set(INTEGRATORS)
     assert name == of_quick == "stability_steps"
 
@@ -163,9 +157,7 @@ def test_the_longest_step_within_an_error_is_told(result):
 
 
 @pytest.mark.parametrize("dt, is_refused", [(None, False), (1e-3, False), (1.1e-5, False), (0.9e-5, True)])
-def test_recorded_controls_may_be_as_long_as_100_000_of_the_steps_that_are_asked_for(
-    tmp_path, dt, is_refused
-):
+def test_recorded_controls_may_be_as_long_as_100_000_steps_that_are_asked_for(tmp_path, dt, is_refused):
     path = tmp_path / "long.csv"
     path.write_text("time,push\n0,0\n1,0.1\n")
     reading = read(TURNING.format(dt=0.002, actuator=MOTOR.replace("<motor", '<motor name="push"')))

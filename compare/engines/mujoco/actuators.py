@@ -78,9 +78,8 @@ def law_at(model: mujoco.MjModel, q: np.ndarray, u: np.ndarray) -> Law:
         damping = np.nan_to_num((force - driven) / speed, posinf=0.0, neginf=0.0)
     last, last_length, last_speed, last_moment = forces(WITHIN[0] * movement, WITHIN[1] * speeds)
     by_law = force - stiffness * (last_length - length) - damping * last_speed
-    is_affine = np.abs(last - by_law) <= AFFINE * np.max(
-        np.abs([force, moved, driven, last]), axis=0, initial=0.0
-    )
+    largest = np.abs([force, moved, driven, last]).max(axis=0, initial=0.0)
+    is_affine = np.abs(last - by_law) <= AFFINE * largest
     least = CONSTANT * np.abs(moment).max(axis=1, initial=0.0)
     others = np.abs([other_moment - moment, last_moment - moment])
     is_constant = others.max(axis=(0, 2), initial=0.0) <= least
@@ -163,23 +162,17 @@ class Actuators:
             acts_on, (place, inputs) = np.flatnonzero(moment), control_of(m, i)
             joint = element_name(m, "joint", m.dof_jntid[acts_on[0]]) if len(acts_on) else ""
             kinds = m.actuator_dyntype[i], m.actuator_gaintype[i], m.actuator_biastype[i]
-            parts = (
-                m.actuator_gainprm[i],
-                m.actuator_biasprm[i],
-                m.actuator_dynprm[i],
-                m.actuator_gear[output_of(m, i)],
-            )
+            parts = m.actuator_gainprm[i], m.actuator_biasprm[i], m.actuator_dynprm[i]
             limits = m.actuator_ctrlrange[place] if inputs and m.actuator_ctrllimited[place] else ()
-            coefficients = sorted(moment[acts_on].tolist())
-            laws[name] = joint, tuple(np.concatenate([kinds, *parts, limits, coefficients]).tolist())
+            last = m.actuator_gear[output_of(m, i)], limits, sorted(moment[acts_on].tolist())
+            laws[name] = joint, tuple(np.concatenate([kinds, *parts, *last]).tolist())
         return laws
 
     @cached_property
     def feeds_back(self) -> bool:
         laws = [law_at(self.model, self.model.qpos0, np.full(len(self.names), u)) for u in (0.0, 1.0)]
-        return any(
-            bool((law.is_affine & ((law.stiffness != 0.0) | (law.damping != 0.0))).any()) for law in laws
-        )
+        feeding = [law.is_affine & ((law.stiffness != 0.0) | (law.damping != 0.0)) for law in laws]
+        return bool(np.any(feeding))
 
     def called(self, postures: Mapping[str, str]) -> "Actuators":
         return Actuators(self.model, {postures[name]: u for name, u in self.stated.items()})
@@ -198,9 +191,8 @@ class Actuators:
         acts &= np.any([gain, *law[:1], *law[2:4], *more[2:4]], axis=0)
         kinds = m.jnt_type[m.dof_jntid]
         turns = (kinds == mujoco.mjtJoint.mjJNT_BALL) | (kinds == mujoco.mjtJoint.mjJNT_FREE)
-        acts &= ~law.moment[:, turns].any(axis=1) | (
-            law.stiffness == 0.0
-        )  # the length of a turn is not linear
+        # the length of a turn is not linear
+        acts &= ~law.moment[:, turns].any(axis=1) | (law.stiffness == 0.0)
         moved = np.abs(law.moment) @ np.broadcast_to(targets, m.nv)
         if (moving := acts & (moved != 0.0) & (law.stiffness > 0.0)).any():
             stiffness = np.where(moving, law.stiffness, 1.0)
@@ -209,18 +201,12 @@ class Actuators:
             slope = gain - (more.stiffness - law.stiffness) * beyond
             u = np.where(moving, u + stiffness * moved / np.where(moving, slope, 1.0), u)
             law = law_at(m, q, u)
-        joints = [
-            m.jnt_qposadr[m.dof_jntid[dof]] + dof - m.jnt_dofadr[m.dof_jntid[dof]] for dof in range(m.nv)
-        ]
-        J = law.moment[acts]
-        at_zero = law.force[acts] + law.stiffness[acts] * (J @ q[joints])
-        return Controller(
-            tuple(float(value) if is_acting else None for value, is_acting in zip(u, acts)),
-            tuple(name for name, is_acting in zip(self.names, acts) if not is_acting),
-            J.T @ at_zero,
-            (J.T * law.stiffness[acts]) @ J,
-            (J.T * law.damping[acts]) @ J,
-        )
+        places, J = np.arange(m.nv) + (m.jnt_qposadr - m.jnt_dofadr)[m.dof_jntid], law.moment[acts]
+        at_zero = law.force[acts] + law.stiffness[acts] * (J @ q[places])
+        controls = tuple(float(value) if is_acting else None for value, is_acting in zip(u, acts))
+        left_out = tuple(name for name, is_acting in zip(self.names, acts) if not is_acting)
+        gains = [(J.T * values[acts]) @ J for values in (law.stiffness, law.damping)]
+        return Controller(controls, left_out, J.T @ at_zero, *gains)
 
 
 def engage(m: mujoco.MjModel, controller: Controller) -> tuple[np.ndarray, np.ndarray]:

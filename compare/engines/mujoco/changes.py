@@ -73,12 +73,9 @@ def with_slower_contacts(model: mujoco.MjModel, factor: float) -> mujoco.MjModel
 
 def with_iterations(model: mujoco.MjModel, count: int) -> mujoco.MjModel | None:
     """With at least `count` iterations of the solver, and of each line search; None: it has as many."""
-    option = model.opt
-    if min(option.iterations, option.ls_iterations) >= count:
-        return None
-    return changed(
-        model, iterations=max(option.iterations, count), ls_iterations=max(option.ls_iterations, count)
-    )
+    numbers = {name: max(count, getattr(model.opt, name)) for name in ("iterations", "ls_iterations")}
+    is_same = all(getattr(model.opt, name) == number for name, number in numbers.items())
+    return None if is_same else changed(model, **numbers)
 
 
 def with_impratio(model: mujoco.MjModel, factor: float) -> mujoco.MjModel:

@@ -191,9 +191,8 @@ def delete_named(
     referring += [element for element in spec.actuators if element.trntype in target]
     referring += [element for element in spec.sensors if element.objtype == thing]
     for element in referring:
-        if names.intersection(
-            getattr(element, field, "") for field in ("name1", "name2", "target", "objname")
-        ):
+        fields = ("name1", "name2", "target", "objname")
+        if names.intersection(getattr(element, field, "") for field in fields):
             spec.delete(element)
     for element in elements:
         spec.delete(element)

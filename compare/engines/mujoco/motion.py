@@ -174,7 +174,5 @@ def acting(m: mujoco.MjModel, data: mujoco.MjData) -> set[str]:
     """The pairs of geoms that touch, with the number of their contacts, and the limits that act."""
     pairs = [tuple(sorted(pair)) for pair in data.contact.geom[data.contact.efc_address >= 0].tolist()]
     found = {f"{' and '.join(pair_of(m, pair))} ({pairs.count(pair)})" for pair in pairs}
-    rows = zip(data.efc_type.tolist(), data.efc_id.tolist())
-    return found | {
-        f"limit of {element_name(m, LIMITS[kind], owner)}" for kind, owner in rows if kind in LIMITS
-    }
+    rows = [row for row in zip(data.efc_type.tolist(), data.efc_id.tolist()) if row[0] in LIMITS]
+    return found | {f"limit of {element_name(m, LIMITS[kind], owner)}" for kind, owner in rows}

@@ -139,22 +139,15 @@ def numbers_of(m: mujoco.MjModel) -> dict[tuple[str, str], np.ndarray]:
     numbers: dict[tuple[str, str], Any] = {}
     for body in range(1, m.nbody):
         inertia = tensor(matrix(m.body_iquat[body]), m.body_inertia[body])
-        values = {
-            "pos": m.body_pos[body],
-            "mass": m.body_mass[body],
-            "com": m.body_ipos[body],
-            "inertia": inertia,
-        }
+        values = {"pos": m.body_pos[body], "mass": m.body_mass[body], "com": m.body_ipos[body]}
+        values["inertia"] = inertia
         numbers |= {(element_name(m, "body", body), name): value for name, value in values.items()}
     for joint in range(m.njnt):
         kind, dof = kind_of(m, joint), m.jnt_dofadr[joint]
         values = {"anchor": m.jnt_pos[joint]} if kind in ("hinge", "ball") else {}
         values |= {"axis": m.jnt_axis[joint]} if kind in ("hinge", "slide") else {}
-        values |= {
-            "armature": m.dof_armature[dof],
-            "damping": m.dof_damping[dof],
-            "stiffness": m.jnt_stiffness[joint],
-        }
+        values |= {"armature": m.dof_armature[dof], "damping": m.dof_damping[dof]}
+        values["stiffness"] = m.jnt_stiffness[joint]
         numbers |= {(joint_name(m, joint), name): value for name, value in values.items()}
     return {key: np.array(value, float) for key, value in numbers.items()}
 

@@ -143,10 +143,8 @@ class Stepper:
         controls: (steps, nu); None: those of the state.
         """
         m = self.model
-        changed = [
-            name for name in INPUTS if np.any(state[self.places[name]] != self.reset[self.places[name]])
-        ]
-        names = ["ctrl", *(name for name in changed if name != "ctrl")]
+        changed = {name: np.any((state != self.reset)[self.places[name]]) for name in INPUTS}
+        names = [name for name in INPUTS if changed[name] or name == "ctrl"]
         rows = np.tile(np.concatenate([state[self.places[name]] for name in names]), (steps, 1))
         if controls is not None:
             rows[:, : m.nu] = controls

@@ -88,12 +88,13 @@ def body_numbers(
     (joints, 3) m: of a hinge, the point of its axis that is nearest to the world's origin; both 0 of a ball.
     """
     before, joints = links_at(reference), coordinates.places.joints
-    bodies, bodies_moved = (
-        [combined([link.in_world for link in links if link.joint == joint]) for joint in range(len(joints))]
-        for links in (before, links_at(moved))
-    )
-    numbers = dict(zip(Body._fields, map(np.array, zip(*bodies))))
-    numbers["com_moved"] = np.array([body.com for body in bodies_moved])
+
+    def bodies(links: Sequence[Link]) -> list[Body]:
+        parts = [[link.in_world for link in links if link.joint == joint] for joint in range(len(joints))]
+        return [combined(of_joint) for of_joint in parts]
+
+    numbers = dict(zip(Body._fields, map(np.array, zip(*bodies(before)))))
+    numbers["com_moved"] = np.array([body.com for body in bodies(links_at(moved))])
     axis, anchor = np.zeros((2, len(joints), 3))
     for k, joint in enumerate(joints):
         if joint.kind == "ball":

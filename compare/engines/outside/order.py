@@ -143,9 +143,8 @@ class Order:
             if joint.kind != "ball":
                 continue
             R, is_free = rotation(q[joint.q]).as_matrix(), self.file.is_free(k)
-            S[rows, joint.qd] = (
-                R if (self.angular_in_world if is_free else self.balls_in_parent) else np.eye(3)
-            )
+            is_outside = self.angular_in_world if is_free else self.balls_in_parent
+            S[rows, joint.qd] = R if is_outside else np.eye(3)
             if not is_free:
                 continue
             first = self.starts[k - 3][1]

@@ -53,9 +53,8 @@ def rows(setup: Setup) -> EnginesResult:
     for engine in others:
         if reason := engine.unavailable():
             absent.setdefault(reason, []).append(LABELS[engine.name])
-    others = sorted(
-        (engine for engine in others if not engine.unavailable()), key=lambda engine: engine.record.compiles
-    )
+    others = [engine for engine in others if not engine.unavailable()]
+    others.sort(key=lambda engine: engine.record.compiles)
     for number, engine in enumerate(others, 1):
         result.answers[LABELS[engine.name]] = {}
         compare_engine(result, setup, engine)
@@ -94,10 +93,8 @@ def compare_engine(result: EnginesResult, setup: Setup, engine: Outside) -> None
     """All that is asked of an engine, until it does not answer."""
     record, label, nv = engine.record, engine.record.label, setup.robot.coordinates.nv
     answer, (fixed, by_speed, by_pair) = result.answers[label], COMPILATION
-    seconds = fixed + by_speed * nv + by_pair * nv**2
-    setup.progress(
-        say(result.finding("asks", engine=label, seconds=seconds if record.compiles else None, speeds=nv))
-    )
+    seconds = fixed + by_speed * nv + by_pair * nv**2 if record.compiles else None
+    setup.progress(say(result.finding("asks", engine=label, seconds=seconds, speeds=nv)))
     dynamics = engine.of(setup.robot.case())
     try:
         compare_numbers(result, setup.robot, record, dynamics.file, dynamics.reading)

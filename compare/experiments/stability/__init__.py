@@ -48,9 +48,7 @@ def begin_of_arm(setup: Setup) -> list[Runs]:
         centres, saddles = centres[:1], saddles[:1]
     places = *product(centres, of(DAMPINGS, DAMPINGS[:1], DAMPINGS[:2])), *product(saddles, (0.0,))
 
-    def runs(
-        function: Callable[..., Any], items: Iterable[Any], judge: Callable[..., None], **more: Any
-    ) -> Runs:
+    def runs(function: Callable[..., Any], items: Iterable[Any], judge: Any, **more: Any) -> Runs:
         return Runs(setup.map(partial(function, engines=engines, **more), items), judge)
 
     methods = {"methods": of(methods_of(engines), few, few)}
@@ -63,10 +61,11 @@ def begin_of_arm(setup: Setup) -> list[Runs]:
         runs(claims.holding_torques, [robot], partial(claims.check_torques, robot=robot)),
     ]
     if not setup.is_quick:
-        counts = {"counts": of(claims.STEP_COUNTS, (), (32, 64, 128, 4096))}
-        begun.append(
-            runs(claims.finer_steps, [robot], partial(claims.check_finer_steps, robot=robot), **counts)
+        counts, finer = (
+            of(claims.STEP_COUNTS, (), (32, 64, 128, 4096)),
+            partial(claims.check_finer_steps, robot=robot),
         )
+        begun.append(runs(claims.finer_steps, [robot], finer, counts=counts))
         ends = partial(claims.check_kept, robot=robot, ends=claims.accelerations_at_end(robot, engines))
         begun.append(runs(claims.kept, [robot], ends))
     return begun

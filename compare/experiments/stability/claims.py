@@ -64,8 +64,7 @@ def holding_torques(robot: Robot, engines: Engines) -> list[ClaimRow]:
     names = [*(f"{VARIANT} {k}" for k in range(1, len(within) + 1)), NEAREST]
     for method in rk4_of_both(engines):
         tau = np.vstack([within, own_torque(method, engines, at)])
-        q, rest = np.tile(at.q, (len(tau), 1)), np.zeros_like(tau)
-        motion = engines[method.engine].of(at.case).run(q, rest, tau, claims.dt, steps, method.name)
+        motion = at.run(method, engines, tau, claims.dt, steps)
         for name, path in zip(names, motion.q):
             moved = number_or_none(deviation(path, at.q))
             rows.append(claim_row(1, at, method, claims.dt, path, torque=name, moved=moved))
@@ -77,12 +76,10 @@ def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None
     add(result, torques)
     claims, reproduced, values = claims_of(robot), True, []
     for engine in dict.fromkeys(row.engine for row in torques):
-        *rows, own = sorted(
-            (row for row in torques if row.engine == engine), key=lambda r: r.torque == NEAREST
-        )
+        *rows, own = [row for row in torques if row.engine == engine]  # the last by its own bias
         if (
             engine == "mujoco"
-        ):  # of TMT no double need be the bias: its compiled code rounds the last sum only once
+        ):  # of TMT no double need be the bias: compiled code rounds its last sum only once
             where, quantity = f"{claims.left}, {own.who}", "movement under the engine's own bias"
             reproduced &= result.check(where, quantity, own.moved, 0.0, "rad", about=About.PREDICTION).passed
         gone = [row.observed for row in rows if row.observed is not None]
@@ -101,15 +98,15 @@ def check_torques(result: Result, torques: list[ClaimRow], robot: Robot) -> None
 def finer_steps(robot: Robot, engines: Engines, counts: Sequence[int] = STEP_COUNTS) -> list[ClaimRow]:
     """Claim 2: departure under RK4 against the step, the torque one ulp off to either side at the first joint."""
     claims, at = claims_of(robot), equilibrium(robot, claims_of(robot).left)
-    rest, rows = np.zeros_like(at.q), list[ClaimRow]()
+    rows = list[ClaimRow]()
     for method in rk4_of_both(engines):
-        own, dynamics = own_torque(method, engines, at), engines[method.engine].of(at.case)
+        own = own_torque(method, engines, at)
         for sign in (1.0, -1.0):
             tau = own.copy()
             tau[0] = np.nextafter(own[0], sign * np.inf)
             for count in counts:
                 dt = claims.duration / count
-                motion = dynamics.run(at.q, rest, tau, dt, round(WATCHED * count), method.name)
+                motion = at.run(method, engines, tau, dt, round(WATCHED * count))
                 i = int(np.argmax(np.abs(motion.v[count]) / np.spacing(np.abs(at.q))))
                 moved = number_or_none(deviation(motion.q[: count + 1], at.q))
                 rows.append(claim_row(
@@ -145,13 +142,9 @@ def kept(robot: Robot, engines: Engines, steps: int = RUN_BEYOND) -> list[ClaimR
     """Claim 3: RK4 at the posture that is kept, below and beyond its limit, the torque one ulp off."""
     at, rows = equilibrium(robot, claims_of(robot).kept), list[ClaimRow]()
     for method in rk4_of_both(engines):
-        tau, dynamics = (
-            np.nextafter(own_torque(method, engines, at), np.inf),
-            engines[method.engine].of(at.case),
-        )
+        tau = np.nextafter(own_torque(method, engines, at), np.inf)
         for dt in STEPS_BEYOND:
-            with np.errstate(over="ignore", invalid="ignore"):
-                motion = dynamics.run(at.q, np.zeros_like(at.q), tau, dt, steps, method.name)
+            motion = at.run(method, engines, tau, dt, steps)
             fast = ~(np.abs(motion.v).max(axis=1) < DIVERGED_RATE)  # no number from there on is motion
             moved = None if fast.any() else number_or_none(deviation(motion.q, at.q))
             ended = float(dt * np.argmax(fast)) if fast.any() else None
@@ -163,10 +156,10 @@ def kept(robot: Robot, engines: Engines, steps: int = RUN_BEYOND) -> list[ClaimR
 def accelerations_at_end(robot: Robot, engines: Engines) -> dict[str, float]:
     """The largest acceleration at the claimed end under the torque that holds the other posture, rad/s2, by engine."""
     at, q = equilibrium(robot, claims_of(robot).kept), robot.posture(claims_of(robot).end)
-    values = {
-        name: engines[name].of(at.case).acceleration(q, np.zeros_like(q), at.tau) for name in robot.compared
+    dynamics, rest = {name: engines[name].of(at.case) for name in robot.compared}, np.zeros_like(q)
+    return {
+        LABELS[name]: float(np.abs(of.acceleration(q, rest, at.tau)).max()) for name, of in dynamics.items()
     }
-    return {LABELS[name]: float(np.abs(value).max()) for name, value in values.items()}
 
 
 def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping[str, float]) -> None:
@@ -182,9 +175,8 @@ def check_kept(result: Result, rows: list[ClaimRow], robot: Robot, ends: Mapping
         stays &= result.check(where, what, time, run, "s", rule="at least", about=about).passed
     for label, size in ends.items():
         quantity = f"acceleration that {claims.kept}'s torque gives a {claims.end} {robot.name}"
-        check = result.check(
-            f"{claims.end}, {label}", quantity, size, PUSHED, "rad/s2", rule="at least", about=about
-        )
+        where = f"{claims.end}, {label}"
+        check = result.check(where, quantity, size, PUSHED, "rad/s2", rule="at least", about=about)
         leaves_end |= check.passed
     above = [row for row in rows if row.dt > limit]
     moves = bool(above) and all(row.observed is not None or (row.moved or 0.0) > MOVED for row in above)

@@ -73,9 +73,7 @@ def departures(
     expected = predicted(at, [method.scheme for method in led], dt, moved, off.reshape(-1, *moved.shape))
     for method, tau, times in zip(led, torques, expected):
         latest = np.inf if np.isnan(times).any() else AWAITED * times.max()
-        steps, dynamics = math.ceil(min(LONGEST_DEPARTURE, latest) / dt), engines[method.engine].of(at.case)
-        with np.errstate(over="ignore", invalid="ignore"):
-            motion = dynamics.run(at.q + moved, np.zeros_like(moved), tau, dt, steps, method.name)
+        motion = at.run(method, engines, tau, dt, math.ceil(min(LONGEST_DEPARTURE, latest) / dt), moved)
         for (size, is_push), time, path in zip(sizes, times, motion.q):
             rows.append(DepartureRow(
                 scene=at.name + ("" if is_push else ", torque off"), engine=method.engine, method=method.name,
@@ -135,8 +133,7 @@ def residual(method: Method, engines: Mapping[str, Engine], at: Equilibrium, tau
 
     Read from the first step of a method, which is so short that nothing moves: Mbar qd / dt.
     """
-    start, rest = np.broadcast_to(at.q, tau.shape), np.zeros_like(tau)
-    motion = engines[method.engine].of(at.case).run(start, rest, tau, INSTANT, 1, method.name)
+    motion = at.run(method, engines, tau, INSTANT, 1)
     return motion.v[..., 1, :] @ at.mass_matrix / INSTANT
 
 

@@ -93,9 +93,8 @@ def shares(
     weight /= weight.sum()
     seen = (at.rates.real > at.small) | (np.abs(at.rates) * quarter * dt >= 2.0 * np.pi)
     seen |= not seen.any()
+    motion = at.run(method, engines, at.tau, float(dt), 4 * quarter, start[:n], start[n:])
     with np.errstate(over="ignore", invalid="ignore"):
-        dynamics = engines[method.engine].of(at.case)
-        motion = dynamics.run(at.q + start[:n], start[n:], at.tau, float(dt), 4 * quarter, method.name)
         deviation = np.concatenate([motion.q - at.q, motion.v], axis=1)
         sizes = np.abs(deviation @ np.linalg.inv(at.shapes).T) ** 2
         parts = sizes[quarter + 1 : 2 * quarter + 1], sizes[3 * quarter + 1 :]

@@ -83,9 +83,8 @@ def add(
     if row.creep_rad_per_s > CREEPS:
         tell(result, "creep", row=row, stops=first.stops)
     if others := [each.rows[0] for each in answers[1:]]:
-        tell(
-            result, "others", rows=others, unstable=[row for row in others if row.stable_at_file_dt is False]
-        )
+        unstable = [row for row in others if row.stable_at_file_dt is False]
+        tell(result, "others", rows=others, unstable=unstable)
 
 
 def tell(result: Result, kind: str, **values: Any) -> None:
@@ -109,7 +108,7 @@ def check(result: Result, row: StepLimitRow, quantity: str) -> None:
         result.not_judged(row.posture, quantity, why, "s", about=About.STEP)
         return
     note, up_to = (
-        f"with {row.file_integrator}{', ' * bool(row.moves_first)}{row.moves_first}",
+        ", ".join(filter(None, [f"with {row.file_integrator}", row.moves_first])),
         row.stable_up_to_s or 0.0,
     )
     limit = max(up_to, row.used_s) if row.stable_at_file_dt else up_to
