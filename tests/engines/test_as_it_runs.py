@@ -6,7 +6,7 @@ import pytest
 
 from compare.engines import RECORDS
 from compare.engines.outside import Outside, as_it_runs
-from compare.engines.outside.as_it_runs import BEYOND, contacts_of, fields, one_run, run
+from compare.engines.outside.as_it_runs import BEYOND, contacts_of, fields, run
 from compare.engines.outside.file import File
 
 # two hinges with dry friction, a servo, and a ball that falls on the floor and rolls
@@ -157,8 +157,7 @@ def test_what_a_solver_has_not_converged_to_goes_with_more_iterations(file):
 
 def test_free_runs_begin_at_the_first_keyframe_with_its_controls(file):
     """How far apart they are is what a script with plain MuJoCo finds."""
-    model = mujoco.MjModel.from_xml_string(RUNNING.format(100, 50))
-    made = one_run(changed(CHANGES["qfrc_actuator"]), file(), model, "float32")
+    made = run(changed(CHANGES["qfrc_actuator"]), "float32", file())
     ends = []
     for gain in (20.0, 21.0):
         m = mujoco.MjModel.from_xml_string(RUNNING.format(100, 50))

@@ -100,26 +100,23 @@ Kind = Callable[[File, Any], Stepper]
 
 
 def run(kind: Kind, precision: str, file: File, iterations: int | None = None) -> Run:
-    """A run of the file by an engine; iterations: of the solver, with LS_ITERATIONS at least; None: the file's own."""
-    source = Source(file.path, file.floating)
-    model = mujoco.MjModel.__copy__(source.model)
+    """A run of the file by an engine, from the first keyframe with its controls, else from qpos0.
+
+    iterations: of the solver, with LS_ITERATIONS at least; None: the file's own.
+    """
+    model = mujoco.MjModel.__copy__(Source(file.path, file.floating).model)
     model.opt.disableflags &= ~bit("AUTORESET")  # MuJoCo Warp refuses it
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     if iterations is not None:
         model.opt.iterations = iterations
         model.opt.ls_iterations = max(LS_ITERATIONS, model.opt.ls_iterations)
-    return one_run(kind, file, model, precision)
-
-
-def one_run(kind: Kind, file: File, model: mujoco.MjModel, precision: str, steps: int = STEPS) -> Run:
-    """Steps from the first keyframe with its controls, else from qpos0."""
     begin, engine, data = time.process_time(), kind(file, model), mujoco.MjData(model)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_forward(model, data)  # for the warm start
     free, apart = engine.put(data), dict[int, float]()
     made, moved = list[Sequence[Fields]](), mujoco.MjData(model)
-    for step in range(1, steps + 1):
+    for step in range(1, STEPS + 1):
         other = engine.get(engine.step(engine.put(data)))
         free = engine.step(free)
         mujoco.mj_copyState(model, data, moved, mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -132,9 +129,8 @@ def one_run(kind: Kind, file: File, model: mujoco.MjModel, precision: str, steps
         made.append((fields(model, data), fields(model, moved), fields(engine.model, other)))
         if step in LISTED:
             apart[step] = float(np.abs(data.qpos - engine.get(free).qpos).max())
-    of_fields = compared(model, made, BEYOND[precision])
-    seconds = time.process_time() - begin
-    return Run(int(model.opt.iterations), int(model.opt.ls_iterations), apart, *of_fields, seconds)
+    of_fields, option = compared(model, made, BEYOND[precision]), model.opt
+    return Run(option.iterations, option.ls_iterations, apart, *of_fields, time.process_time() - begin)
 
 
 def distance(values: Array, others: Array) -> Array:

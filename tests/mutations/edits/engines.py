@@ -20,7 +20,7 @@ EDITS = (
     ("outside.bodies", "combined", "point_inertia(com - centre, m)", "0.0", "Steiner's part is forgotten"),
     ("outside.as_it_runs", "compared", "PASSING * peaks[name]", "peaks[name]",
      "a difference is beside the largest of all steps"),
-    ("outside.as_it_runs", "one_run", "mujoco.mj_resetDataKeyframe(*_1)", "None", "a run begins at qpos0"),
+    ("outside.as_it_runs", "run", "mujoco.mj_resetDataKeyframe(*_1)", "None", "a run begins at qpos0"),
     ("outside.as_it_runs", "fields", "sorted(contacts_of(d))", "list(contacts_of(d))", "contacts in another order differ"),
     ("timing", "is_timed", "scatter(taken) <= STEADY", "True", "one disturbed call is a time"),
     ("engines.outside", "OutsideDynamics.at", "tau - passive(*_1)", "tau", "damping is forgotten"),
