@@ -206,8 +206,8 @@ class Pushed(Runs):
         more = MORE_WAYS if self.rests else MORE_WAYS // 2  # what falls is no more certain with more of them
         for why, way, dof, speed in self.further(trial, range(WAYS, WAYS + more)):
             if why:
-                found = {"why": why, "way": way, "dof": dof, "speed": max(speed, verdict.speed)}
-                self.tried[trial] = verdict._replace(**found)
+                most = max(speed, verdict.speed)
+                self.tried[trial] = verdict._replace(why=why, way=way, dof=dof, speed=most)
                 return False
         self.surely.add(trial)
         return True

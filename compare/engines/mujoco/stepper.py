@@ -35,14 +35,12 @@ _log.set()
 class Rolled(NamedTuple):
     """A batch of runs, without their starts.
 
-    q, v: after each step, (runs, steps, nq) and (runs, steps, nv), rad or m, and per s; NaN from where a run
-    ends. ended: how many steps each run took before MuJoCo found a bad number, (runs,) integers; `steps`: all.
-    states: where each run is at last, (runs, n): the start of a roll that goes on.
+    q, v: after each step, (runs, steps, nq) and (runs, steps, nv), rad or m, and per s; NaN from where MuJoCo
+    finds a bad number. states: where each run is at last, (runs, n): the start of a roll that goes on.
     """
 
     q: Array
     v: Array
-    ended: Array
     states: Array
 
 
@@ -171,19 +169,18 @@ class Stepper:
         inputs: controls at each step, (steps, nu) or (runs, steps, nu); None: those of the states, constant.
         Rolling on from `Rolled.states` is the same as rolling on at once; a run that has ended ends at once.
         """
-        m, starts = self.model, np.atleast_2d(np.asarray(states, float))
-        rows: list[Array | None] = [None] * len(starts)
+        m, ends = self.model, np.array(states, float, ndmin=2)
+        rows: list[Array | None] = [None] * len(ends)
         if inputs is not None:
-            rows = [*np.broadcast_to(np.asarray(inputs, float), (len(starts), steps, m.nu))]
-        paths = np.full((len(starts), steps, 1 + m.nq + m.nv), np.nan)
-        ends, ended = starts.copy(), np.full(len(starts), steps)
-        for k, (start, controls) in enumerate(zip(starts, rows)):
+            rows = [*np.broadcast_to(np.asarray(inputs, float), (len(ends), steps, m.nu))]
+        paths = np.full((len(ends), steps, 1 + m.nq + m.nv), np.nan)
+        for k, (start, controls) in enumerate(zip(ends, rows)):
             path = self.loop(start, steps, controls)()[:, : paths.shape[2]]
             if self.data.warning.number.any():  # the loop ends at any, a run where a number is bad
                 watched = [np.r_[d.time, d.qpos, d.qvel] for d in self.watch(start, steps, controls)]
                 path = np.reshape(watched, (-1, paths.shape[2]))
-            paths[k, : len(path)], ended[k], ends[k] = path, len(path), self.state()
-        return Rolled(paths[:, :, 1 : 1 + m.nq], paths[:, :, 1 + m.nq :], ended, ends)
+            paths[k, : len(path)], ends[k] = path, self.state()
+        return Rolled(paths[:, :, 1 : 1 + m.nq], paths[:, :, 1 + m.nq :], ends)
 
     def taken(self, path: Array) -> int:
         """How many steps of a path of `loop` there are, (steps, size), where the data are at its end.
