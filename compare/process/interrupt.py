@@ -12,12 +12,11 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from math import inf
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from typing import Any
 
 from ..core.errors import how_ended
@@ -36,11 +35,8 @@ class Now:
 
     is_listening = False  # a signal ends what the command line runs
     is_interrupted = False
-    is_settled = False  # a signal is too late
-    is_undivided = False  # a signal waits
     outcome = "nothing was written"
     waits: tuple[str, float] | None = None  # a user's own function that is running, and since when
-    interrupted_in: tuple[str, float] = "", 0.0  # such a function, and for how long, s
     parent: Connection | None = None
 
 
@@ -55,25 +51,38 @@ def ended_by_signals(run: Callable[[], int], is_own: bool = False) -> int:
     can_fork = sys.platform == "linux" and hasattr(os, "fork")
     context = get_context("fork") if can_fork else get_context("spawn")
     ours, theirs = context.Pipe()
-    told: dict[str, Any] = {"outcome": Now.outcome}
+    told, is_interrupted = dict[str, Any](outcome=Now.outcome), False
     heard = [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
     child = context.Process(target=as_child, args=(run, theirs, is_own))
-    for number in heard:  # the child begins deaf to what a terminal sends to all processes
-        signal.signal(number, signal.SIG_IGN)
+
+    def handle(action: Any) -> None:
+        for number in heard:
+            signal.signal(number, action)
+
+    def hear(kinds: set[str], seconds: float) -> None:
+        """Take what the child tells, up to one of these or the last, for so long, while it is there."""
+        until = time.monotonic() + seconds
+        with suppress(EOFError, OSError):
+            while not told.keys() & {*kinds, "end"} and time.monotonic() < until:
+                is_there = child.is_alive()
+                if ours.poll(POLL):
+                    told.update([ours.recv()])
+                elif not is_there:
+                    return
+
+    handle(signal.SIG_IGN)  # the child begins deaf to what a terminal sends to all processes
     child.start()
     theirs.close()
     try:
-        for number in heard:
-            signal.signal(number, signal.default_int_handler)
-        hear(ours, child, told, "end", inf)
+        handle(signal.default_int_handler)
+        hear(set(), inf)
     except KeyboardInterrupt:
+        is_interrupted = True
         with suppress(KeyboardInterrupt):  # a second one
             child.terminate()
-            hear(ours, child, told, "ending", ENDING if "keeps" in told else ANSWER)
-            hear(ours, child, told, "end", ENDING if "ending" in told else 0.0)
-        told.setdefault("interrupted", "")
-    for number in heard:
-        signal.signal(number, signal.SIG_IGN)
+            hear({"ending", "interrupted"}, ENDING if "keeps" in told else ANSWER)
+            hear(set(), ENDING if told.keys() & {"ending", "interrupted"} else 0.0)
+    handle(signal.SIG_IGN)
     if "end" in told:
         child.join(ANSWER)
     if is_own:
@@ -87,24 +96,12 @@ def ended_by_signals(run: Callable[[], int], is_own: bool = False) -> int:
         shutil.rmtree(unfinished, ignore_errors=True)
         remove_empty(made)
     how = f"the run ended before its end{', perhaps by your equations' * is_own}: {how_ended(child.exitcode or 0)}"
-    if "interrupted" in told:
-        how = f"interrupted{told['interrupted']}"
+    if is_interrupted or "interrupted" in told:
+        how = f"interrupted{told.get('interrupted', '')}"
         with suppress(OSError):
             os.write(2, b"\r\x1b[2K" * os.isatty(2))  # over ^C
     streams.say_error(f"{how}; {told['outcome']}")
     return 2
-
-
-def hear(pipe: Connection, child: BaseProcess, told: dict[str, Any], kind: str, seconds: float) -> None:
-    """Add what a child tells, up to a message of this kind or the last one, for so long, while it is there."""
-    until = time.monotonic() + seconds
-    with suppress(EOFError, OSError):
-        while not told.keys() & {kind, "end"} and time.monotonic() < until:
-            is_there = child.is_alive()
-            if pipe.poll(POLL):
-                told.update([pipe.recv()])
-            elif not is_there:
-                return
 
 
 def end_group(leader: int = 0) -> None:
@@ -127,10 +124,8 @@ def as_child(run: Callable[[], int], parent: Connection, is_own: bool) -> None:
         listen()
         status = run()
     except KeyboardInterrupt:
-        name, seconds = Now.interrupted_in
         with suppress(BaseException):
             at_end.close()
-        tell("interrupted", f" while waiting for {name}, {seconds:.0f} s" if name else "")
     tell("end", status)
     leave(0)
 
@@ -139,32 +134,21 @@ def listen() -> None:
     """From now on SIGTERM is a KeyboardInterrupt, once."""
 
     def heard(*_: object) -> None:
-        if Now.is_settled or Now.is_interrupted:
+        if Now.is_interrupted:
             return
-        Now.is_interrupted, Now.interrupted_in = True, waited_for()
-        tell("ending")
-        if not Now.is_undivided:
-            raise KeyboardInterrupt
+        name, seconds = waited_for()
+        Now.is_interrupted = True
+        tell("interrupted", f" while waiting for {name}, {seconds:.0f} s" if name else "")
+        raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, heard)
     Now.is_listening = True
 
 
-@contextmanager
-def undivided() -> Iterator[None]:
-    """A block that a signal waits for; where it settles, it is too late."""
-    was, Now.is_undivided = Now.is_interrupted, True
-    try:
-        yield
-    finally:
-        Now.is_undivided = False
-    if Now.is_interrupted and not (was or Now.is_settled):
-        raise KeyboardInterrupt
-
-
 def settle() -> None:
-    """From now on a signal does not change the exit status."""
-    Now.is_settled = True
+    """From now on a signal is too late: it does not change the exit status."""
+    if Now.is_listening:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)
     tell("ending")
 
 

@@ -62,8 +62,9 @@ def has_report(out: Path) -> bool:
 def exchange(work: Path, out: Path, shown: Path) -> None:
     """Move the old report away and the new one in; on an error put everything back."""
     out.mkdir(exist_ok=True)
-    with locked(out), interrupt.undivided(), ExitStack() as back:
+    with locked(out), ExitStack() as back:
         refuse_foreign(out, shown)
+        interrupt.settle()
         old = Path(tempfile.mkdtemp(prefix="old-", dir=work))
         for name in OWN:
             for source, target in ((out / name, old / name), (work / name, out / name)):
@@ -71,7 +72,6 @@ def exchange(work: Path, out: Path, shown: Path) -> None:
                     os.replace(source, target)
                     back.callback(os.replace, target, source)
         back.pop_all()
-        interrupt.settle()
 
 
 def clear_away(out: Path) -> None:

@@ -33,7 +33,7 @@ interrupt.leave(interrupt.ended_by_signals(run))
 """
 TESTS = Path(__file__).parents[1]
 ALL = command("all", "--quick", "--out", "report")
-OWN = [*ALL, "--reference", f"{TESTS / 'own_equations.py'}:", "--mjcf", "../double.xml"]
+OWN = [*ALL, "--reference", f"{TESTS / 'helpers' / 'own_equations.py'}:", "--mjcf", "../double.xml"]
 ROLLING = [sys.executable, "-c", ROLLOUT]
 RUNS = {  # what runs, and what it is sent: as it begins, after its first line, or when its folder is there
     "workers start": (ALL, "SIGTERM"), "a folder": (ALL, "SIGHUP"), "own equations": (OWN, "SIGINT"),
@@ -52,6 +52,7 @@ def test_an_interrupt_is_answered_within_a_second(tmp_path, name):
             time.sleep(0.8)
         elif what != ROLLING:
             while not any(place.iterdir()):
+                assert run.poll() is None
                 time.sleep(0.02)
             time.sleep(0.3)  # the folder is registered
         else:
