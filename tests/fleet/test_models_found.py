@@ -1,11 +1,9 @@
 """Which files a fleet has: folders, patterns, files and lists, what is left out, and what a file needs beside itself."""
 
-import io
 import os
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from compare.core.errors import Refused
 from compare.fleet.models import found_models
@@ -92,17 +90,12 @@ def robot(assets, geoms=GEOM, more=""):
 @pytest.fixture
 def collection(here):
     """A model with parts below and above its folder."""
-    image = io.BytesIO()
-    Image.linear_gradient("L").save(image, "PNG")
     hand = robot(MESH.format("finger.obj"), more="<compiler meshdir='shapes'/>")
     defaults = "<default><geom density='500'/></default><include file='deeper/settings.xml'/>"
     assets = MESH.format("../../../shared/meshes/above.obj") + "<model name='hand' file='hand/hand.xml'/>"
-    assets += "<hfield name='h' file='ground.png' size='1 1 0.1 0.1'/>"
-    assets += "<texture name='c' type='cube' fileup='up.png'/>"
-    more = "<compiler meshdir='assets' texturedir='pictures'/><include file='parts/defaults.xml'/>"
+    more = "<compiler meshdir='assets'/><include file='parts/defaults.xml'/>"
     files = {
-        "shared/meshes/above.obj": TETRAHEDRON.format(1), "robots/r/assets/ground.png": image.getvalue(),
-        "robots/r/pictures/up.png": image.getvalue(), "robots/r/hand/hand.xml": hand,
+        "shared/meshes/above.obj": TETRAHEDRON.format(1), "robots/r/hand/hand.xml": hand,
         "robots/r/parts/defaults.xml": f"<mujocoinclude>{defaults}</mujocoinclude>",
         "robots/r/deeper/settings.xml": "<mujocoinclude><option timestep='0.003'/></mujocoinclude>",
         "robots/r/hand/shapes/finger.obj": TETRAHEDRON.format(4),

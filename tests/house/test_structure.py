@@ -35,14 +35,11 @@ MODULES = {dotted(file) for file in FILES} | TMT
 
 
 @cache
-def imports(path, for_types=True) -> frozenset[str]:
-    """Full names of what a file imports, wherever in it: a module, or a name in one. for_types: also if for annotations alone."""
-    package, tree = dotted(path if path.name == "__init__.py" else path.parent / "__init__.py"), parsed(path)
-    blocks = [node for node in ast.walk(tree) if isinstance(node, ast.If)]
-    of_types = [block for block in blocks if ast.unparse(block.test) == "TYPE_CHECKING" and not for_types]
-    left_out = {node for block in of_types for node in ast.walk(block)}
+def imports(path) -> frozenset[str]:
+    """Full names of what a file imports, wherever in it: a module, or a name in one."""
+    package = dotted(path if path.name == "__init__.py" else path.parent / "__init__.py")
     found = set()
-    for node in set(ast.walk(tree)) - left_out:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -52,14 +49,8 @@ def imports(path, for_types=True) -> frozenset[str]:
     return frozenset(found)
 
 
-@cache
-def parsed(path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-@cache
-def modules_imported(path, for_types=True) -> set[str]:
-    names = imports(path, for_types)
+def modules_imported(path) -> set[str]:
+    names = imports(path)
     return {name if name in MODULES else name.rpartition(".")[0] for name in names} & MODULES - {dotted(path)}
 
 
