@@ -1,1 +1,1 @@
-"""Which step is stable: rest, the step linearised there, its growth, limits, cures, and what runs show."""
+"""Which step is stable: runs of a file after a push, their limits and remedies; a held posture of the arm, linearized."""

@@ -1,4 +1,4 @@
-"""Small robots with a servo or a spring, as MJCF text: for judge, stability and test_robot_of_a_file."""
+"""Small robots with a servo or a spring, as MJCF text: for tests of judge, truth, experiments and robots."""
 
 from compare.engines.mujoco import read
 from compare.robots.file import robot_of
