@@ -96,5 +96,5 @@ EDITS = (
     ("mujoco.motion", "carried", "here.qfrc_applied[v] = _1", "pass", "forces that act all the time are lost"),
     ("mujoco.motion", "apart", "np.isfinite(error)", "True", "a run that fails has no error"),
     ("mujoco.inventory", "light_joints", "m.dof_M0[dof] < of_ball", "m.dof_M0[dof] < 0.9 * of_ball", "a light body is none"),
-    ("mujoco.written", "ALL_DIGITS", "17", "6", "a written file has six digits"),
+    ("mujoco.written", "exact", "repr(*found)", "word", "a written file has six digits"),
 )  # fmt: skip
