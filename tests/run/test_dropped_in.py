@@ -101,7 +101,7 @@ def test_all_and_a_fleet_run_them_and_the_report_the_chart_of_speed_and_the_tabl
     with open(copy / "report/tables/speed.csv", newline="") as file:
         assert {row["engine"] for row in csv.DictReader(file)} == {"mujoco", "tmt", "twin"}
     colours = imread(copy / "report/figures/overview_times.png")[..., :3].reshape(-1, 3)
-    assert (abs(colours - np.array([0x12, 0x34, 0x56]) / 255.0) < 1e-3).all(axis=1).any()
+    assert (abs(colours - np.array([0x12, 0x34, 0x56]) / 255.0) < 0.02).all(axis=1).any()  # of a palette
     output(copy, "fleet", "models", "--only", "trace", "--out", "fleet", "--workers", "1")
     with open(copy / "fleet/fleet.csv", newline="") as file:
         (row,) = csv.DictReader(file)
