@@ -36,7 +36,9 @@ def as_gains(model: Tree, torque: Torque) -> tuple[Tree, Array, Torque | None]:
         rows = jacobian(lambda x: by_place(torque, x, nq), tape.inputs(*range(1 + nq + nv)))
         by = np.array([[tape.lift(x).number for x in row] for row in rows], dtype=float)
         by_q, by_qd = by[:, 1 + first], by[:, 1 + nq :]
-        driven = with_gains(model, by_q, by_qd)
+        stated = {"position_gain": (model.position_gain, by_q), "speed_gain": (model.speed_gain, by_qd)}
+        gains = {name: np.array(own or np.zeros((nv, nv))) - gain for name, (own, gain) in stated.items()}
+        driven = replace(model, **gains)
         constant = checked(model, torque, 0.0, zero, nothing) - by_q @ zero[first]
     except Exception:  # whatever a user's function raises of arguments that are no numbers; gains of a ball
         return model, nothing, torque
@@ -53,12 +55,6 @@ def as_gains(model: Tree, torque: Torque) -> tuple[Tree, Array, Torque | None]:
 def by_place(torque: Torque, x: Values, nq: int) -> Values:
     state = (np.array(part, dtype=object) for part in (x[1 : 1 + nq], x[1 + nq :]))
     return list(np.ravel(torque(x[0], *state)))
-
-
-def with_gains(model: Tree, by_q: Array, by_qd: Array) -> Tree:
-    nothing = np.zeros((model.nv, model.nv))
-    gains = {"position_gain": by_q, "speed_gain": by_qd}
-    return replace(model, **{x: np.array(getattr(model, x) or nothing) - gain for x, gain in gains.items()})
 
 
 def checked(model: Tree, torque: Torque, t: float, q: Array, qd: Array) -> Array:

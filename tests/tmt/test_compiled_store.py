@@ -59,9 +59,7 @@ def test_each_question_has_a_file_of_its_own(folder):
     assert len(files(folder)) == len(questions)
 
 
-@pytest.mark.parametrize(
-    "change, is_other", [("", False), ("file.write_text(file.read_text() + '#')", True)]
-)
+@pytest.mark.parametrize("change, is_other", [("", False), ("file.write_text(file.read_text() + '#')", True)])
 def test_a_source_that_changes_has_another_name_in_the_next_process(change, is_other, tmp_path):
     shutil.copytree(ROOT / "tmt", tmp_path / "tmt", ignore=shutil.ignore_patterns("__pycache__"))
     code = "import tmt; from tmt.compiled import sources; from pathlib import Path; "
