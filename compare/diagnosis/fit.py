@@ -99,10 +99,10 @@ class Search:
         part.size = float(np.linalg.norm(part.off)) or 1.0
         return part
 
-    def beside(self, added: ndarray) -> "Search":
-        """The search of what explains the rest beside what adds `added` (states, entries) to the values."""
+    def beside(self, one: Hypothesis) -> "Search":
+        """The search of what explains the rest beside a complete hypothesis."""
         part = copy(self)
-        part.given = self.given - added
+        part.given = self.given - np.asarray(one.column)
         part.off = part.weighted(part.right)
         return part
 

@@ -25,7 +25,6 @@ RARE, MASSLESS = 0.15, 0.2  # what an anchor or a new armature, and no mass cost
 NATURAL = 1.0  # a cause that costs less is said; the others only if there is no such
 ADDED, PAIR = 0.1, 0.3  # a number that was 0, a second cause
 UNUSUAL = 1.0  # of a factor or a number that nobody writes
-DIGITS = {5: 1e-9, 3: 1e-5}  # and how exact a number with that count of digits is, a share
 ALL = slice(None)  # entries of a state
 Entries = slice | list[int]
 
@@ -48,11 +47,6 @@ class Hypothesis(NamedTuple):
     def key(self) -> tuple[str, str]:
         """What tells it from the others of its kind."""
         return self.cause.place, str(self.cause.explains)
-
-    @property
-    def added(self) -> ndarray:
-        """What a complete one adds to the values, (states, entries)."""
-        return np.asarray(self.column)
 
     @property
     def joints(self) -> JointMap | None:
@@ -179,8 +173,8 @@ def of_number(value: float, stated: float, equations: Equations) -> float:
 
 def is_round(x: float) -> bool:
     """Whether a number has few digits, as people write them, the fewer the less exact it is."""
-    rounded = {float(f"{x:.{digits}g}"): exact for digits, exact in DIGITS.items()}
-    return any(abs(x - near) <= exact * abs(x) or abs(x) < exact for near, exact in rounded.items())
+    exact = {5: 1e-9, 3: 1e-5}  # a share, by the count of digits
+    return any(abs(x - float(f"{x:.{n}g}")) <= share * abs(x) or abs(x) < share for n, share in exact.items())
 
 
 def is_written(x: float, right: float) -> bool:

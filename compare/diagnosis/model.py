@@ -5,11 +5,11 @@ broadcast with positions (states,), real or complex; the derivative by a number 
 imaginary change of 1e-100, exact to rounding.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import cached_property
-from itertools import chain
-from typing import Any, NamedTuple
+from itertools import chain, islice
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy import ndarray
@@ -49,6 +49,7 @@ class Frame(NamedTuple):
     axes: ndarray  # as columns
 
 
+T = TypeVar("T")
 Changes = Mapping[Path, ndarray]  # what is added to a number, (changes,)
 
 
@@ -179,6 +180,13 @@ class Equations:
         table, nv = np.stack(np.broadcast_arrays(*flat, np.zeros(len(self.q))), axis=-1)[..., :-1], self.nv
         M_flat, of_velocity, of_gravity = np.split(table, [nv * nv, nv * nv + nv], axis=-1)
         return M_flat.reshape(*table.shape[:-1], nv, nv), of_velocity, of_gravity
+
+
+def blocks(items: Iterable[T], size: int) -> Iterator[list[T]]:
+    """Items that are evaluated together."""
+    rest = iter(items)
+    while block := list(islice(rest, size)):
+        yield block
 
 
 def whole(numbers: ndarray) -> ndarray:

@@ -74,7 +74,7 @@ def of_slips(
         near += [(after[v, k], kind, family.hypotheses[complete[v]], k) for v, k in np.argwhere(may)]
     for _, kind, one, k in sorted(near, key=lambda pair: pair[0])[:MOST_NEAR]:
         chosen = [polynomial[k]]
-        beside = search.beside(one.added)
+        beside = search.beside(one)
         family = Family([numbers.hypotheses[chosen[0]]], numbers.first[chosen], numbers.second[chosen])
         if explaining(beside.alone(family)):
             yield kind, one, family.hypotheses[0]

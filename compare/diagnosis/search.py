@@ -186,7 +186,7 @@ class Explanations:
             families = {kind: self.family(kind) for kind in complete}
             for kind, one, other in of_slips(self.few, self.family(open_kind), families):
                 for slip, number in product(self.at_all(kind, [one]), self.at_all(open_kind, [other])):
-                    beside = self.search.beside(slip.added)
+                    beside = self.search.beside(slip)
                     for fit in explaining(beside.alone(beside.expanded([number]))):
                         yield together([slip.cause, fit.cause], 0.0)
 

@@ -29,12 +29,7 @@ from .setup import Setup
 
 MOST_SAID = 3  # of causes that do the same
 POINTS = 61  # of a curve
-SECONDS_OF_CONDITIONS = 3.0
-# of Mbar and h at each state, that the conditions take, about: in all, and for each joint
-CALLS_OF_CONDITIONS, CALLS_FOR_A_JOINT = 30, 16
-OF_EQUATIONS = "M and h, largest difference over its tolerance"
-OF_ACCELERATIONS = "accelerations follow from M and h: force left over, over its tolerance"
-ACCELERATIONS_ALONE = "accelerations: force left over, over its tolerance"
+SECONDS_OF_CONDITIONS, CALLS_OF_CONDITIONS = 3.0, 20  # calls of Mbar and h at each state
 WHOSE_VALUES = {"own": "Your", "mujoco": "MuJoCo's"}
 
 
@@ -120,11 +115,11 @@ def diagnosed(setup: Setup) -> Found:
     found = found._replace(ratio=float(shares.max()))
     if own is None:
         return found
-    is_drawn = (
-        given.mass_matrix is not None and found.why.diagnosis.differs and not found.why.diagnosis.causes
-    )
-    curve = telling_curve(own, tree, values, shares) if is_drawn else None
-    return found._replace(conditions=conditions_of(own, values), curve=curve)
+    found = found._replace(conditions=conditions_of(own, values))
+    is_explained = not found.why.diagnosis.differs or bool(found.why.diagnosis.causes)
+    if given.mass_matrix is None or is_explained:
+        return found
+    return found._replace(curve=telling_curve(own, tree, values, shares))
 
 
 def telling_curve(dynamics: OwnDynamics, tree: tmt.Tree, values: Values, shares: np.ndarray) -> Curve:
@@ -145,12 +140,12 @@ def conditions_of(dynamics: OwnDynamics, values: Values) -> list[Condition] | No
     """The conditions on a user's own Mbar and h at as many states as there is time for; None: at none."""
     if not values.are_finite:
         return []
-    q, qd = values.q, values.qd
-    calls = CALLS_OF_CONDITIONS + CALLS_FOR_A_JOINT * dynamics.coordinates.nv
-    count = dynamics.equations.affordable(calls * len(q), SECONDS_OF_CONDITIONS) // calls
+    calls = CALLS_OF_CONDITIONS * len(values.q)
+    count = dynamics.equations.affordable(calls, SECONDS_OF_CONDITIONS) // CALLS_OF_CONDITIONS
     if count == 0:
         return None
-    every = conditions(dynamics.mass_matrix, dynamics.bias, dynamics.coordinates, q[:count], qd[:count])
+    functions = dynamics.mass_matrix, dynamics.bias, dynamics.coordinates
+    every = conditions(*functions, values.q[:count], values.qd[:count])
     return [condition for condition in every if np.isfinite(condition.tolerance)]
 
 
@@ -163,9 +158,10 @@ def rows(setup: Setup) -> DiagnosisResult:
     if found.ratio is not None:
         is_known = found.why.diagnosis.differs or np.isfinite(found.ratio)
         finding = result.finding("of_equations" if is_known else "no_numbers", found=found)
-        check(result, found, Condition(OF_EQUATIONS, found.ratio, 1.0, "", finding))
+        name = "M and h, largest difference over its tolerance"
+        check(result, found, Condition(name, found.ratio, 1.0, "", finding))
     finding = result.finding("of_forces" if np.isfinite(found.why.force_ratio) else "no_numbers", found=found)
-    name = ACCELERATIONS_ALONE if found.ratio is None else OF_ACCELERATIONS
+    name = f"accelerations{' follow from M and h' * (found.ratio is not None)}: force left over, over its tolerance"
     check(result, found, Condition(name, found.why.force_ratio, 1.0, "", finding))
     names = [field.name for field in fields(CauseRow)]
     result.rows = [CauseRow(**{name: getattr(cause, name) for name in names}) for cause in found.causes]

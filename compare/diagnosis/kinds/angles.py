@@ -171,7 +171,7 @@ def other_angles(equations: Equations, search: Search) -> Iterator[Hypothesis]:
             values, is_constant = search.right + change[:, None] * column, np.ptp(change) == 0.0
             yield slip(equations.right, place, said, values, CONSTANT if is_constant else ANGLE, "angle")
     factors = [*coefficients(equations), *terms(equations)]
-    columns = [(one.cause.place, one.added) for one in factors if one.cause.kind in OF_FACTORS]
+    columns = [(one.cause.place, np.asarray(one.column)) for one in factors if one.cause.kind in OF_FACTORS]
     hinges = [name for name, kind in zip(equations.joints, equations.tree.kind) if kind == "hinge"]
     for (place, column, _), name in product(parallel(search, columns), hinges):
         for yours, other in permutations(("1", f"sin({name})", f"cos({name})"), 2):

@@ -24,13 +24,12 @@ from ...core.words import listed
 from ...robots.joint_map import PER_UNIT, Joint, JointMap
 from ..cause import together
 from ..hypothesis import Hypothesis
-from ..model import Equations
+from ..model import Equations, blocks
 from .terms import speeds_of_joints
 
 # of kinds
 COSTS = {"sign": 0.0, "order": 0.25, "unit": 0.1, "angles": 0.0, "displacement": 0.1, "axes": 0.15}
 FIRST, OF_NAME, OF_SLIDE = 0.1, 0.15, 0.2  # more, of the first joint, of each other, of a slide
-BLOCK = 64  # conventions that are evaluated together
 PARALLEL = 1e-9  # of a cosine from 1
 MOST_PERMUTED = 6  # joints in all orders; of more, orders in which programs count, and two exchanged
 MOST_TURNED = 10  # joints with all combinations of senses
@@ -67,10 +66,8 @@ class Convention:
 
 def conventions(equations: Equations) -> Iterator[Hypothesis]:
     """The right equations in each convention, evaluated in blocks."""
-    every = [convention for kind in KINDS for convention in kind(equations)]
     tree, here = equations.tree, forces(equations.tree, equations.q, equations.qd)
-    for start in range(0, len(every), BLOCK):
-        block = every[start : start + BLOCK]
+    for block in blocks((convention for kind in KINDS for convention in kind(equations)), 64):
         q, qd = (np.concatenate([getattr(convention, name) for convention in block]) for name in ("q", "qd"))
         parts = Equations(equations.tree, q, qd, equations.layout).parts
         for convention, *of_model in zip(block, *(np.split(part, len(block)) for part in parts)):

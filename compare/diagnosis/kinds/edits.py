@@ -14,7 +14,7 @@ from numpy import ndarray
 from ...core.words import listed
 from ...robots.coordinates import point_inertia
 from ..hypothesis import Hypothesis, slip
-from ..model import Changes, Equations, Path
+from ..model import Changes, Equations, Path, blocks
 from .numbers import XYZ, Owners, sets_of_bodies, sets_of_joints
 
 UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
@@ -26,7 +26,6 @@ ORDERS = sorted(list(permutations(range(3)))[1:], key=lambda order: -sum(k == or
 EXCHANGES = ORDERS[:3]  # of two axes
 DIAGONAL = np.eye(3, dtype=bool)
 BODY, NUMBERS = 0.12, 0.2  # costs: of a body left out, of other edits
-BLOCK = 64  # edits that are evaluated together
 EQUAL = 1e-12  # of a moment of inertia: two that are equal except for rounding
 # the place, what it explains, the fields that differ; the owner of the place, of how many
 Edit = tuple[Any, ...]
@@ -48,9 +47,7 @@ def edits(equations: Equations) -> Iterator[Hypothesis]:
             if moved:
                 key = frozenset((path, f"{x:.12g}") for path, x in moved.items())
                 chosen.setdefault(key, (cost, edit, moved))
-    every = list(chosen.values())
-    for start in range(0, len(every), BLOCK):
-        block = every[start : start + BLOCK]
+    for block in blocks(chosen.values(), 64):
         paths = dict.fromkeys(path for *_, moved in block for path in moved)
         rows: Changes = {path: np.array([moved.get(path, 0.0) for *_, moved in block]) for path in paths}
         for (cost, (place, explains, _, *owner), _), values in zip(block, equations.values(rows)):

@@ -1,18 +1,17 @@
 """The slips that are made in positions, angular velocities, tensors and axes; see kinematics.py."""
 
 from collections.abc import Iterator
-from itertools import islice, product
+from itertools import product
 
 import numpy as np
 from numpy import ndarray
 
 from ..hypothesis import Hypothesis, slip
 from ..layout import MOST_SPEEDS
-from ..model import Equations
+from ..model import Equations, blocks
 from .kinematics import SAME, Changed, Kinematics
 from .numbers import XYZ
 
-BLOCK = 48  # slips that are evaluated together
 WAYS = "", "", ", with the right accelerations"  # how it is said
 FACTORS = {"left out": -1.0, "with the other sign": -2.0}  # of what is changed, which are added
 VELOCITY, ROTATION = "velocity of the CoM of {}", "angular velocity of {}"  # places
@@ -23,7 +22,7 @@ def slips_of_kinematics(equations: Equations) -> Iterator[Hypothesis]:
     """The values with each slip of one body, and with those that all bodies can have, in each of the ways."""
     kinematics, names = Kinematics(equations), equations.tree.body_names
     found: dict[Key, list[list[ndarray]]] = {}
-    for block in batched(all_slips(kinematics), BLOCK):
+    for block in blocks(all_slips(kinematics), 48):
         for item, added in zip(block, kinematics.effects(block)):
             for body in (item.body, None) if item.of_body else (None,):
                 found.setdefault((item.place, body, item.explains), []).append(added)
@@ -40,11 +39,6 @@ def slips_of_kinematics(equations: Equations) -> Iterator[Hypothesis]:
                 values = equations.right + values
                 owners = len(effects) if owner else 1
                 yield slip(equations.right, place, explains + how, values, owner=owner, owners=owners)
-
-
-def batched(slips: Iterator[Changed], count: int) -> Iterator[list[Changed]]:
-    while block := list(islice(slips, count)):
-        yield block
 
 
 def all_slips(mechanism: Kinematics) -> Iterator[Changed]:
