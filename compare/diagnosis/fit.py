@@ -52,9 +52,9 @@ class Fitted(NamedTuple):
 
 
 class Family(NamedTuple):
-    """Hypotheses with the coefficients of the values in each one's change over its size, (n, states, entries).
+    """Hypotheses, all open or all complete, with the coefficients of the values in each one's change over its size.
 
-    They are exact for all except directions and zeros.
+    (n, states, entries); exact for all except directions and zeros. Of complete ones the first is what they add.
     """
 
     hypotheses: list[Hypothesis]
@@ -102,7 +102,7 @@ class Search:
     def beside(self, one: Hypothesis) -> "Search":
         """The search of what explains the rest beside a complete hypothesis."""
         part = copy(self)
-        part.given = self.given - np.asarray(one.column)
+        part.given = self.given - self.expanded([one]).first[0]
         part.off = part.weighted(part.right)
         return part
 
@@ -150,8 +150,9 @@ class Search:
         moved = [k for k, one in enumerate(hypotheses) if one.moves]
         if moved:
             sets, size = [(hypotheses[k],) for k in moved], np.array([[hypotheses[k].size] for k in moved])
-            up, down = (self.values(sets, sign * size) for sign in (1.0, -1.0))
-            first[moved], second[moved] = (up - down) / 2.0, (up + down) / 2.0 - self.right
+            up = self.values(sets, size) - self.right
+            down = self.values(sets, -size) - self.right if hypotheses[moved[0]].is_open else -up
+            first[moved], second[moved] = (up - down) / 2.0, (up + down) / 2.0
         return Family(hypotheses, first, np.broadcast_to(second, first.shape))
 
     def alone(self, family: Family, is_thorough: bool = True) -> list[Fitted]:

@@ -6,6 +6,7 @@ the fewer and rounder numbers, and the commoner slip, is named first.
 """
 
 from dataclasses import replace
+from itertools import product
 from math import log10
 from typing import Any, NamedTuple
 
@@ -18,6 +19,9 @@ from .model import Equations, Path
 
 OF_ZERO = "zero position"  # a kind: the zero of a joint is a convention
 COMMON_FACTORS = (-1.0, 0.0, 0.5, 1.0, 2.0)
+# angles that are written in one unit and read in the other, rad
+COMMON_ANGLES = np.radians(np.outer((90, 180, 45, 30, 60, 15, 120, 135, 150, 270), (1.0, -1.0)).ravel())
+WRITTEN = 1e-6  # of a turn: what the digits of an angle leave
 FIT_ROUNDING = 1e-11  # of the size of a number: what a fit leaves of a number that is 0
 SMALL = 1e-9  # of the other numbers: a number that a regression leaves at 0
 EVERY = 0.03  # what a cause in several bodies or joints costs more
@@ -72,10 +76,16 @@ class Hypothesis(NamedTuple):
         return value >= self.least or bool(stated and np.isclose(value, -stated, rtol=SMALL))
 
     def explained(self, change: float) -> Cause:
-        """The cause with its number."""
+        """The cause with its number; of a zero whose angle is read in another unit, both angles."""
         cause = self.cause
         if not self.is_open:
             return cause
+        if cause.kind == OF_ZERO and cause.unit == "rad":
+            for meant, read in product(COMMON_ANGLES, (np.degrees, np.radians)):
+                turns = (change - read(meant) + meant) / (2.0 * np.pi)
+                if abs(turns - round(turns)) < WRITTEN:
+                    right, yours = abs(float(meant)), abs(float(read(meant)))
+                    return replace(cause, rank=2, kind="number", stated=right, explains=yours, cost=0.0)
         stated, explains, more = float(cause.stated), self.value(change), 0.0
         field = self.moves[0][0].field if self.moves else ""
         if field == "mass" and explains == 0.0:

@@ -10,7 +10,7 @@ from helpers.trees import one_body
 import tmt
 from compare.diagnosis import Values, diagnose
 from compare.diagnosis.fit import Fitted
-from compare.diagnosis.hypothesis import number
+from compare.diagnosis.hypothesis import OF_ZERO, number
 from compare.diagnosis.layout import packed
 
 
@@ -236,6 +236,14 @@ def test_neither_noise_nor_numbers_at_random_have_a_culprit(size):
     found = diagnosis(right * (1.0 + size * noise) if size < 1.0 else noise, TREE)
     assert found.differs and found.causes == ()
     assert size < 1.0 or len(found.entries) == 5
+
+
+@pytest.mark.parametrize("change, read, meant", [
+    (90.0 - np.pi / 2.0 - 28.0 * np.pi, 90.0, np.pi / 2.0), (1.5707963 * (np.pi / 180.0 - 1.0), np.pi**2 / 360.0, np.pi / 2.0),
+])  # fmt: skip
+def test_a_zero_that_is_read_in_another_unit_is_its_angle(change, read, meant):
+    cause = number("zero of knee", 0.0, "rad", kind=OF_ZERO).explained(change)
+    assert (cause.kind, cause.explains, cause.stated) == ("number", pytest.approx(read), pytest.approx(meant))
 
 
 @pytest.mark.slow

@@ -242,10 +242,13 @@ def test_a_velocity_with_the_part_of_another_body():
     assert place == "velocity of the CoM of forearm" and "beta" in explains and "upper arm" in explains
 
 
-def test_one_of_both_blocks_of_M_of_the_other_sign():
+def test_one_of_both_blocks_of_M_transposed_or_of_the_other_sign():
     M, velocity_terms, rest = parts(STONE)
     M = M.copy()
-    M[:, :3, 3:] *= -1.0
+    M[:, :3, 3:] = np.swapaxes(M[:, :3, 3:], 1, 2)
+    found = first(of_parts(STONE, M, velocity_terms, rest))
+    assert found == ("M[stone x, stone y, stone z][stone turn]", "transposed")
+    M[:, :3, 3:] = -np.swapaxes(M[:, :3, 3:], 1, 2)
     found = of_parts(STONE, M, velocity_terms, rest).causes[0]
     assert (found.place, found.explains) == ("M[stone x, stone y, stone z][stone turn]", pytest.approx(-1.0))
 

@@ -14,7 +14,7 @@ from numpy import ndarray
 from ...core.words import listed
 from ...robots.coordinates import point_inertia
 from ..hypothesis import Hypothesis, slip
-from ..model import Changes, Equations, Path, blocks
+from ..model import Equations, Path
 from .numbers import XYZ, Owners, sets_of_bodies, sets_of_joints
 
 UNITS = {  # factors of units that are taken for others, and the fields of a tree that have them
@@ -34,25 +34,20 @@ Way = Callable[[ndarray], ndarray]
 
 
 def edits(equations: Equations) -> Iterator[Hypothesis]:
-    """The values with each edit that changes a number."""
-    stated = equations.stated
-    chosen: dict[frozenset[tuple[Path, str]], tuple[float, Edit, dict[Path, float]]] = {}
+    """Each edit that changes a number, once."""
+    stated, chosen = equations.stated, dict[frozenset[tuple[Path, str]], Hypothesis]()
     for of_kind in KINDS:
-        cost = BODY if of_kind is absent else NUMBERS
-        for edit in of_kind(equations):
+        cost, kind = (BODY, "body") if of_kind is absent else (NUMBERS, "numbers")
+        for place, explains, fields, *owner in of_kind(equations):
             moved: dict[Path, float] = {}
-            for name, field in edit[2].items():
+            for name, field in fields.items():
                 changed = np.argwhere(field != stated[name]).tolist()
                 moved |= {Path(name, at := tuple(k)): float(field[at] - stated[name][at]) for k in changed}
             if moved:
                 key = frozenset((path, f"{x:.12g}") for path, x in moved.items())
-                chosen.setdefault(key, (cost, edit, moved))
-    for block in blocks(chosen.values(), 64):
-        paths = dict.fromkeys(path for *_, moved in block for path in moved)
-        rows: Changes = {path: np.array([moved.get(path, 0.0) for *_, moved in block]) for path in paths}
-        for (cost, (place, explains, _, *owner), _), values in zip(block, equations.values(rows)):
-            kind = "body" if cost == BODY else "numbers"
-            yield slip(equations.right, place, explains, values, cost, kind, 2, "", *owner)
+                one = slip(equations.right, place, explains, equations.right, cost, kind, 2, "", *owner)
+                chosen.setdefault(key, one._replace(column=None, moves=tuple(moved.items())))
+    yield from chosen.values()
 
 
 def in_order(order: tuple[int, ...]) -> str:

@@ -1,7 +1,7 @@
 """Explanations without a number to fit: options of a file or a program, slips of derivatives."""
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from tmt import literal
 
 from ..hypothesis import Hypothesis, option, slip
 from ..model import TINY, Changes, Equations, Path
+from .terms import speeds_of_joints
 
 OF_ENERGY = {  # slips in Mdot qd - d(qd' Mbar qd / 2)/dq: place, what it is, and the factors of both
     ("gradient of the kinetic energy in h", "left out"): (1.0, 0.0),
@@ -56,6 +57,16 @@ def program_options(equations: Equations) -> Iterator[Hypothesis]:
             values = equations.layout.packed(M + (factor - 1.0) * change, moving, rest)
             yield option(equations.right, f"entries of M {where} the diagonal", "there", explains, values)
     rotors: Changes = {Path("armature", (i,)): np.array([-rotor]) for i, rotor in enumerate(tree.armature)}
+    for (first, rows), (second, columns) in combinations(speeds_of_joints(tree).items(), 2):
+        above, below = np.ix_(range(len(q)), rows, columns), np.ix_(range(len(q)), columns, rows)
+        upper, lower = f"M[{first}][{second}]", f"M[{second}][{first}]"
+        blocks = {upper: [above], lower: [below], f"{upper} and {lower}": [above, below]}
+        for place, those in blocks.items() if len(rows) == len(columns) > 1 else ():
+            turned = M.copy()
+            for at in those:
+                turned[at] = np.swapaxes(M[at], 1, 2)
+            values = equations.layout.packed(turned, moving, rest)
+            yield option(equations.right, place, "there", "transposed", values)
     if any(tree.armature):
         without = equations.values(rotors)[0]
         yield option(equations.right, "armature", "on the diagonal of Mbar", "left out", without)
