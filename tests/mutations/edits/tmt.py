@@ -33,6 +33,7 @@ EDITS = (
      "gains of positions act on speeds"),
     ("evaluator", "Evaluator.__init__", "not tree.never_singular", "False", "compiled code answers where Mbar is singular"),
     ("answers", "by_machine_code", "prepared.get((tree, quantity))", "None", "a prepared model is forgotten"),
+    ("exact.series", "expansion", "ah.compare('lt', 0.0)", "ah.compare('le', 0.0)", "pairs have the other sign at half a turn"),
     ("compiled.sources", "contents", "file.read_bytes()", "b''", "changed sources keep their name"),
     ("simulation", "simulate", "values.positive('dt', dt, 'a step in s')", "float(dt)", "a step may be negative"),
     ("answers", "by_machine_code", "count <= SMALL", "True", "machine code never answers unasked"),
