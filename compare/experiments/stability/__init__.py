@@ -27,6 +27,10 @@ def claim_values(robot: Robot) -> dict[str, Any]:
     return {name.lower(): numbers[name] for name in names.split()}
 
 
+def skipped(robot: Robot) -> Finding | None:
+    return None if robot.is_read or robot.claims else Finding("stability", "no_claims", {"noun": robot.noun})
+
+
 def begin(setup: Setup) -> list[Runs]:
     """Start the runs."""
     return of_file.begin(setup, setup.reading) if setup.reading else begin_of_arm(setup)
