@@ -21,7 +21,12 @@ from tmt.model import singular
 from tmt.model.tree import Tree, checked_model
 from tmt.model.values import real_numbers
 
-UNITS = {"q": ("rad", "m"), "qd": ("rad/s", "m/s"), "tau": ("N m", "N"), "qdd": ("rad/s2", "m/s2")}
+ARGUMENTS = {  # of a state
+    "q": "(..., nq), rad; of slides m, of balls a quaternion w, x, y, z",
+    "qd": "(..., nv), rad/s; of slides m/s, of balls the angular velocity in the body's frame",
+    "qdd": "(..., nv), rad/s2; of slides m/s2",
+    "tau": "(..., nv), N m; of slides N",
+}
 MOST = 256  # evaluators that are held, besides those that are prepared
 DOUBLE = np.dtype(float)
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -34,16 +39,17 @@ def documented(function: Function) -> Function:
     text = inspect.getdoc(function)
     if text is None:  # python -OO
         return function
-    model, *states = inspect.signature(function).parameters
-    shapes = ", ".join(f"(..., {'nq' if name == 'q' else 'nv'})" for name in states)
-    units, of_slides = (", ".join(UNITS[name][k] for name in states) for k in (0, 1))
+    _, *states = inspect.signature(function).parameters
     solved = " a singular Mbar," if quantity_of(function.__name__).solves else ""
+    arguments = "\n".join(f"{name} : {ARGUMENTS[name]}" for name in states)
     before, mark, examples = text.partition("\n\n>>> ")
     shared = f"""
 Raises ValueError for wrong shapes, values that are not finite,{solved} results beyond the largest double.
+
 Parameters
 ----------
-{", ".join((model, *states))} : Tree, {shapes}; {units}, of slides {of_slides}, of balls q is w, x, y, z"""
+model : Tree
+{arguments}"""
     function.__doc__ = before + shared + mark + examples
     return function
 

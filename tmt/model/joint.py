@@ -17,7 +17,7 @@ OF_JOINT = "joint_names", "parent", "offset", "kind", "stiffness"
 OF_BODY = "body_names", "body_joint", "mass", "com", "inertia"
 
 
-@dataclass(frozen=True, eq=False, match_args=False)
+@dataclass(eq=False, match_args=False)
 class Joint:
     """A joint of `Tree.from_joints`, and the body that it moves.
 
