@@ -23,7 +23,7 @@ from ..judge.agree import agree, over
 from ..judge.entries import Entries, unit
 from ..judge.scale import EPS, FACTOR
 from ..robots import Robot
-from ..robots.states import MOST_SPEEDS, Sample
+from ..robots.states import MOST_SPEEDS, Sample, singular_positions
 from . import Drawing, Functions
 from .quantities import QUANTITIES
 from .setup import Setup
@@ -73,16 +73,30 @@ class Comparison:
 def rows(name: str, setup: Setup) -> Result:
     """The quantities of an experiment at named postures and random states, and its further checks."""
     experiment, result = EXPERIMENTS_AT_STATES[name], Result(name, label=LABELS[setup.robot.compared[0]])
-    comparisons = [Comparison(setup, result, sample) for sample in (setup.named, setup.random)]
+    samples = [setup.named, setup.random]
+    if name == "acceleration" and not setup.robot.own:
+        samples = [part for sample in samples if len((part := regular_part(result, sample)).q)]
+    comparisons = [Comparison(setup, result, sample) for sample in samples]
     for comparison in comparisons:
         for quantity in quantities(name, setup.robot):
             comparison.compare(quantity)
         result.notes += comparison.sample.notes
-    if len(comparisons[-1].engines) > 2:
+    if comparisons and len(comparisons[-1].engines) > 2:
         result.find("rows_compiled", of="shared")
-    if experiment.more:
+    if comparisons and experiment.more:
         experiment.more(result, comparisons)
     return result
+
+
+def regular_part(result: Result, sample: Sample) -> Sample:
+    """The states at which Mbar is regular; of the others there is no acceleration to judge."""
+    is_singular, why = singular_positions(sample.tree, sample.q)
+    if not is_singular.any():
+        return sample
+    place = sample.describe(int(np.argmax(is_singular)))
+    result.not_judged(sample.name, "qdd", f"Mbar is singular at {place}: {why}")
+    exact = int((~is_singular[: sample.exact_states]).sum())
+    return sample.part(np.flatnonzero(~is_singular), exact)
 
 
 def quantities(name: str, robot: Robot) -> list[str]:

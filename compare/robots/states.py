@@ -7,6 +7,7 @@ import numpy as np
 
 import tmt
 from tmt.derivation.composite import mass_matrix_and_bias  # literal takes minutes for hundreds of joints
+from tmt.model import singular
 
 from ..core.finding import Finding
 from .case import SEED, Robot
@@ -54,10 +55,22 @@ class Sample:
 
     def first(self, count: int) -> "Sample":
         """The first states, without exact values."""
-        if count >= len(self.q):
-            return self
-        q, qd, tau = self.q[:count], self.qd[:count], self.tau[:count]
-        return Sample(self.tree, self.name, q, qd, tau, 0, self.states[:count])
+        return self if count >= len(self.q) else self.part(np.arange(count), 0)
+
+    def part(self, places: np.ndarray, exact_states: int) -> "Sample":
+        """The states with these numbers, the first of which have exact values."""
+        q, qd, tau = self.q[places], self.qd[places], self.tau[places]
+        names = tuple(self.states[k] for k in places) if self.states else ()
+        return Sample(self.tree, self.name, q, qd, tau, exact_states, names, self.notes)
+
+
+def singular_positions(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, str]:
+    """At which of these positions (N, nq) Mbar is singular, and which joints move no mass at the first of them."""
+    if tree.never_singular:
+        return np.zeros(len(q), bool), ""
+    moving = singular.found(tree, singular.mass_matrices(tree, q))
+    at = moving.any(axis=1)
+    return at, singular.reason(tree, moving[np.argmax(at)]) if at.any() else ""
 
 
 def named(robot: Robot) -> Sample:

@@ -18,6 +18,7 @@ from ...engines.mujoco.names import INTEGRATORS
 from ...engines.mujoco.reading import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
+from ...robots.states import singular_positions
 from .. import Drawing
 from ..setup import Setup
 from . import standing, ways
@@ -45,6 +46,10 @@ def rows(setup: Setup) -> Result:
     integrator = next((name for name in names if INTEGRATORS[name] == engine.model.opt.integrator), "")
     if not integrator:
         result.not_judged("", "A and B of the file's step", "tmt has no step of its integrator")
+        return result
+    is_singular, why = singular_positions(case.tree, case.q[None])
+    if is_singular.any():
+        result.not_judged(case.name, "A and B of the file's step", f"Mbar is singular at its start: {why}")
         return result
     subject = Subject(engine, case, dt, integrator, setup.of(10, 4, 2))
     function = ways.TRANSITION if subject.stepper.takes_transition else ways.BY_STEPS
