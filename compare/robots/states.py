@@ -69,7 +69,7 @@ def singular_positions(tree: tmt.Tree, q: np.ndarray) -> tuple[np.ndarray, str]:
     if tree.never_singular:
         return np.zeros(len(q), bool), ""
     moving = singular.found(tree, singular.mass_matrices(tree, q))
-    at = moving.any(axis=1)
+    at = np.asarray(moving.any(axis=1))
     return at, singular.reason(tree, moving[np.argmax(at)]) if at.any() else ""
 
 
