@@ -182,8 +182,8 @@ class Pushed(Runs):
     def further(self, trial: Trial, ways: range) -> Iterator[tuple[str, int, int, float]]:
         """How runs of further patterns fail, or "", the pattern, what moves first, and the speed at the end.
 
-        They are judged beside the fine runs of the first patterns, of which the fastest counts; what is in motion, also
-        beside that of their own pattern: which way it tumbles depends on the push.
+        They are judged beside the fine runs of the first patterns, of which the fastest counts; what fails, also beside that
+        of its own pattern: which way it tumbles, and whether it topples at any step, depends on the push.
         """
         push, fine = trial.push, self.fine_runs(trial.push)
         most, last = (np.max([getattr(run, name) for run in fine], axis=0) for name in ("most", "last"))
@@ -193,9 +193,12 @@ class Pushed(Runs):
         for way in ways:
             run = self.run(trial, way, fastest, lasts)
             why, own_most = self.failure(run, whole, push, is_chance), most
-            if why and self.is_in_motion:
-                own_most = np.maximum(most, self.fine_run(push, way, lasts).most)
+            if why and (self.is_in_motion or (self.rests and run.is_finite)):
+                own = self.fine_run(push, way, lasts)
+                own_most = np.maximum(most, own.most)
                 why = self.failure(run, whole._replace(most=own_most), push, is_chance)
+                if self.rests and self.failure(own, whole, push, is_chance):
+                    why = ""  # not survived at fine steps either
             yield why, way, self.first(run, own_most, push), run.speed
 
     def sure(self, trial: Trial) -> bool:

@@ -23,6 +23,12 @@ UPRIGHT = """<mujoco><option timestep="0.002"/><worldbody><body pos="0 0 1"><joi
   <geom type="capsule" size="0.02" fromto="0 0 0 0 0 0.5" mass="1"/></body></worldbody>{}</mujoco>"""
 BOX = """<mujoco><option timestep="0.002"/><worldbody>{floor}<body name="box" pos="0 0 0.1"><freejoint/>
   <geom type="box" size="0.2 0.2 0.1" mass="2"/></body></worldbody></mujoco>"""
+# a ball that moves on a hidden cart, 5 cm from the edge of a shelf
+LEDGE = """<mujoco><default><geom condim="1"/></default><worldbody><geom type="box" size="0.5 0.5 0.1" pos="0.45 0 -0.1"/>
+  <body pos="0 0 0.05"><joint type="slide" axis="1 0 0" damping="6"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+    <body><joint type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="0.1" diaginertia="1 1 1"/>
+      <body><joint type="slide" axis="1 0 0" damping="6"/><geom size="0.05" mass="1"/></body></body></body>
+  </worldbody></mujoco>"""
 FLOOR = '<geom type="plane" size="2 2 1"/>'
 SERVO = f'<position name="servo" joint="turn" kp="{KP}" kv="{KV}"/>'
 LIMIT = (-KV + (KV**2 + 4.0 * INERTIA * KP) ** 0.5) / KP  # s, of Euler with this servo: 17.5 ms
@@ -50,13 +56,16 @@ def compiled(text, dt=None, integrator=None):
     return model
 
 
-def end_speed(text, dt, integrator, push, seed=7, lasts=4.0):
-    """The largest speed in the last quarter of a plain run after a push, rad/s or m/s; inf: it diverges."""
+def end_speed(text, dt, integrator, push, seed=7, lasts=4.0, signs=None):
+    """The largest speed in the last quarter of a plain run after a push, rad/s or m/s; inf: it diverges.
+
+    signs: of the push of each speed; None: random ones.
+    """
     model = compiled(text, dt, integrator)
     data, rng = mujoco.MjData(model), np.random.default_rng(seed)
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
-    data.qvel[:] += push * np.sign(rng.normal(size=model.nv))
+    data.qvel[:] += push * np.array(signs or np.sign(rng.normal(size=model.nv)))
     count, speed = round(lasts / dt), 0.0
     for step in range(count):
         mujoco.mj_step(model, data)

@@ -10,6 +10,7 @@ from helpers.pushed_models import (
     FLOOR,
     INERTIA,
     KP,
+    LEDGE,
     LIMIT,
     UPRIGHT,
     end_speed,
@@ -193,3 +194,11 @@ def test_a_run_that_diverges_is_not_said_to_be_damped():
         file_integrator="Euler",
     )
     assert row.is_damped and not replace(row, outcome="diverges").is_damped
+
+
+def test_a_push_that_topples_at_fine_steps_is_no_fault_of_the_step():
+    """A ball near a ledge falls off after one pattern of signs, which is not among the first four, and at any step."""
+    assert end_speed(LEDGE, 2.5e-4, "Euler", 0.1, signs=(-1.0, -1.0, -1.0)) > 20.0
+    assert all(end_speed(LEDGE, 0.01, "Euler", 0.1, signs=(sign, 1.0, -sign)) < 0.01 for sign in (1.0, -1.0))
+    row = euler(LEDGE)
+    assert row.judged_by == "rest" and row.stable_at_file_dt and row.stable_up_to_s > 0.01

@@ -41,5 +41,7 @@ EDITS = (
     ("stability.answer", "worst_step", "min(*_1)", "max(*_1)", "the largest of the limits"),
     ("of_file", "begin", "asked.dt or _1", "_1", "a requested step is the file's"),
     ("of_file", "check", "row.stable_at_file_dt is None", "False", "what is not judged passes"),
-    ("stability.push", "Pushed.further", "why and self.is_in_motion", "False", "what tumbles is judged beside another pattern"),
+    ("stability.push", "Pushed.further", "self.failure(own, whole, push, is_chance)", "False",
+     "what topples at any step is the step's fault"),
+    ("stability.push", "Pushed.further", "self.is_in_motion or _1", "_1", "what tumbles is judged beside another pattern"),
 )  # fmt: skip
