@@ -252,7 +252,7 @@ def test_what_is_stated_is_in_the_axes_of_the_body_whatever_else_the_file_asks_f
 
 def test_a_tensor_may_be_off_by_rounding_of_the_sum_of_its_moments():
     row = rows_of(mjcf(BODY.format("1 1.5 2", "")))["b", "inertia"]
-    assert row.tolerance == pytest.approx(64 * EPS * 4.5)
+    assert row.tolerance == pytest.approx(64 * EPS * 4.5, rel=1e-9, abs=0.0)
 
 
 ROD = """<mujoco><worldbody><body><joint name="j" axis="0 1 0" {}/>

@@ -21,7 +21,8 @@ from tmt.methods import METHODS, amplification
 EPS = 2.0**-52
 EULER = METHODS["semi_implicit_euler"]
 # one hinge without gravity: a linear system, and nothing but a sum of roundings
-TURN = one_body([(0.0, 0.0, 1.0)], inertia=np.diag([1.0, 1.0, 2.0]), gravity=(0.0, 0.0, 0.0))
+UP, DISC = (0.0, 0.0, 1.0), np.diag([1.0, 1.0, 2.0])
+TURN = one_body([UP], inertia=DISC, gravity=(0.0, 0.0, 0.0))
 TORQUE = np.array([3.0])
 
 
@@ -60,7 +61,7 @@ def test_what_a_controller_feeds_back_is_rounded_too():
     assert gain_scale(driven, q, qd) == pytest.approx(fed) and not gain_scale(TURN, q, qd).any()
     _, size, bound = slope_rounding(METHODS["rk4"], driven, q, qd, TORQUE, 0.1)
     assert size == pytest.approx(np.abs(3.0 - 50.0 * q - 4.0 * qd) / M)
-    assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed) / M, rel=1e-9)
+    assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed) / M, rel=1e-9, abs=0.0)
 
 
 def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
@@ -69,12 +70,13 @@ def test_the_force_of_a_step_counts_every_term_by_its_absolute_value():
     q, qd, tau, dt, M = 0.3, -4.0, 2.0, 0.01, 0.05275
     (h,) = tmt.bias(tree, np.array([q]), np.array([qd]))
     a = (tau - 0.5 * qd - h) / M
-    weight = 9.81 * 1.5 * (0.15 + 0.15 / 8 + 0.45 / 64)
+    from_centre = 1.9 / (1.9 + 1.5) * np.hypot(0.15 * np.cos(q), 0.15 + 0.15 * np.sin(q))
+    weight = 9.81 * 1.5 * (0.15 + from_centre / 4 + 0.45 / 64)
     S = weight + 1.5 * 0.15**2 * abs(np.sin(2 * q)) * qd**2 + tau + 0.5 * 4.0
     rates = dt * (64 * EPS * M * abs(a) + 64 * EPS * S) / M + 8 * EPS * (4.0 + dt * abs(a))
     expected = [8 * EPS * (q + dt * 4.0) + dt * rates, rates]
     at = tree, np.array([[q]]), np.array([[qd]]), np.array([tau]), dt
-    assert step_rounding(METHODS["explicit_euler"], *at)[0] == pytest.approx(expected, rel=1e-9)
+    assert step_rounding(METHODS["explicit_euler"], *at)[0] == pytest.approx(expected, rel=1e-9, abs=0.0)
     assert 0.85 < step_rounding(EULER, *at)[0, 1] / rates < 1.0  # the same with Mbar + dt D in Mbar's place
 
 
@@ -89,7 +91,38 @@ def test_the_band_is_the_sum_of_what_each_step_adds_carried_to_the_present(every
         k = np.arange(n)
         # an error of rate reaches the angle in its own step through the sum, in each later one through dt
         expected = [(angles[:n] + (n - 1 - k) * dt * rates[:n]).sum(), rates[:n].sum()]
-        assert row == pytest.approx(expected, rel=1e-9 if every == 1 else 0.04)
+        assert row == pytest.approx(expected, rel=1e-9 if every == 1 else 0.04, abs=0.0)
+
+
+def test_the_band_is_carried_by_the_jacobian_of_each_step_where_they_differ():
+    """Along a swinging arm, whose Jacobians change: from step to step, w+ = |J| carried roundings, one by one."""
+    steps, dt, tau = 12, 0.05, np.zeros(3)
+    _, q, qd = tmt.simulate(tmt.ARM, [2.0, 0.5, 1.0], [1.0, -2.0, 3.0], tau, dt, steps, "semi_implicit_euler")
+    delta = step_rounding(EULER, tmt.ARM, q[:-1], qd[:-1], tau, dt)
+    carried, expected = np.zeros((6, 0)), [np.zeros(6)]
+    for step, added in enumerate(delta):
+        J = tmt.step_derivatives(tmt.ARM, q[step], qd[step], tau, dt, "semi_implicit_euler")[0]
+        carried = np.hstack([J @ carried, np.diag(added)])
+        expected.append(np.abs(carried).sum(axis=1))
+    for every in (1, 4, 12):
+        assert band(EULER, tmt.ARM, q, qd, tau, dt, every) == pytest.approx(
+            np.array(expected[::every]), rel=1e-9, abs=0.0
+        )
+
+
+def test_roundings_of_two_joints_do_not_cancel_in_an_acceleration():
+    """Two discs on one axis, Mbar = ((4, 2), (2, 2)): its inverse ((1, -1), (-1, 2)) / 2 is taken without signs."""
+    discs, tau = (
+        one_body([UP] * 2, inertia=DISC, gravity=(0.0, 0.0, 0.0), armature=(2.0, 0.0)),
+        np.array([3.0, 1.0]),
+    )
+    a, _, bound = slope_rounding(METHODS["rk4"], discs, np.zeros((1, 2)), np.zeros((1, 2)), tau, 0.1)
+    assert a == pytest.approx(np.array([[1.0, -0.5]]))
+    R = np.array([[4.0, 8.0**0.5], [8.0**0.5, 2.0]])
+    errors = 64 * EPS * (R @ np.abs(a[0]) + tau)
+    assert bound[0] == pytest.approx(
+        [(errors[0] + errors[1]) / 2.0, errors[0] / 2.0 + errors[1]], rel=1e-9, abs=0.0
+    )
 
 
 def test_growth_at_rest_on_a_saddle_is_that_of_the_powers_of_its_step():

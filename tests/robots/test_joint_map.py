@@ -65,6 +65,17 @@ def test_two_maps_one_after_the_other_are_one(first, second, rng):
     assert np.allclose(both.own_speeds(v), outer.own_speeds(inner.own_speeds(v)))
 
 
+def test_what_follows_degrees_takes_them_as_they_are():
+    """-(0.3 - 0.1) rad in deg, and 0.5; degrees of degrees cannot be stated."""
+    inner, outer, again = (
+        joint_map(ARM, [hip, "knee", "rail"]) for hip in ("hip-0.1rad in deg", "-hip+0.5rad", "hip in deg")
+    )
+    assert np.allclose(
+        outer.after(inner, ARM).own_positions([0.3, 1.0, 2.0]), [0.5 - np.degrees(0.2), 1.0, 2.0]
+    )
+    assert again.after(inner, ARM) is None
+
+
 def tree(names, kinds) -> tmt.Tree:
     """A chain of joints along y with a body of 1 kg on each."""
     n = len(names)

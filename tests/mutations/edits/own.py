@@ -20,6 +20,7 @@ EDITS = (
     ("joint_map", "JointMap.own_speeds", "_1 * self.of_v", "_1", "speeds stay in rad/s"),
     ("joint_map", "put", "np.argsort(at)", "at", "an order is taken the other way"),
     ("joint_map", "JointMap.after", "stated.sign * inner.zero", "inner.zero", "the first zero of two keeps its sense"),
+    ("joint_map", "JointMap.after", "stated.zero / _1", "stated.zero", "a second zero is in rad where the first joint is in deg"),
     ("joint_map", "within_a_turn", "zero if slides else _1", "_1", "the zero of a slide is turned back"),
     ("robots.placement", "matched_joints", "tree.kind[j] == kind", "True", "joints are matched whatever they are"),
     # the comparison
