@@ -15,6 +15,7 @@ from .search import largest
 ITERATIONS = 2, 4, 10, 50  # of the solver
 NOSLIP, IMPRATIO = 10, 100.0  # that stop a creep
 WITHIN = 1.2  # fold: how closely the least strength of a change is found
+STRONGER = 1.0, 1.5  # fold: tried where further pushes show the least strength to be too little
 PARTS = 2, 4, 10  # of a step, while a program's period stays
 TIMED = 200  # steps
 Change = Callable[[mujoco.MjModel, float], mujoco.MjModel | None]  # None: the file has nothing to change
@@ -55,8 +56,10 @@ def remedies(pushed: Pushed) -> list[Remedy]:
             return changed is None or not comes_to_rest(pushed, changed)
 
         _, least = largest(fails, first, first / 100.0, most, WITHIN)
-        if least is not None and (remedy := confirmed(pushed, change(model, least), name, least)):
-            found.append(remedy)
+        for strength in [fold * least for fold in STRONGER] if least is not None else ():
+            if remedy := confirmed(pushed, change(model, strength), name, strength):
+                found.append(remedy)
+                break
     return found
 
 
@@ -83,7 +86,9 @@ def confirmed(pushed: Pushed, model: mujoco.MjModel | None, name: str, number: f
         return None
     changed = of_changed(pushed, model)
     changed.find_truth()
-    verdict = changed.verdict(Trial(pushed.push, pushed.dt, pushed.integrator))
+    trial = Trial(pushed.push, pushed.dt, pushed.integrator)
+    changed.sure(trial)
+    verdict = changed.verdict(trial)
     borne = changed.survived >= pushed.survived
     if not (borne and verdict.holds):
         return None
