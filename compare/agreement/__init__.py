@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.text import block, say
-from .comparison import Comparison, State
+from .comparison import Comparison
 from .tree import tree
+from .values import State
 from .why import Why, cause_of
 
 __all__ = ["Difference", "State", "assert_agrees", "differences", "tree"]

@@ -9,7 +9,8 @@ from numpy import ndarray
 from ..core.finding import Finding
 from ..engines.own import QUANTITIES
 from ..judge.scale import EPS
-from .comparison import OF_CORIOLIS, Compared, Comparison
+from .comparison import Comparison
+from .values import OF_CORIOLIS, Compared
 
 FEW = 0.15  # of the rows, at most
 LEAST_ROWS = 8

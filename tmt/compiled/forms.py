@@ -8,12 +8,13 @@ paths, and the accelerations of large trees, are shorter in the axes of the worl
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Any
 
 from tmt.derivation.dual import seeded
 from tmt.derivation.form import ARTICULATED, BY_BODIES, COMPOSITE, Form
 from tmt.derivation.mechanism import Mechanism
 from tmt.derivation.quantities import State, Step, argument_of, quantity_of
-from tmt.derivation.vectors import Rows, Scalar, Values
+from tmt.derivation.vectors import Rows, Scalar, Values, minus, plus
 from tmt.methods import Linearized, method_named, one_step
 from tmt.methods.stepping import Method
 from tmt.model.tree import Tree
@@ -110,3 +111,26 @@ def directional(tree: Tree, stepping: Method) -> Traced:
         return [*(value for value, _ in parts), *(slope for _, slope in parts)]
 
     return shortest("directional", (nq, nv, nv, 1, nq, nv), both, forms_of_slopes(tree))
+
+
+def residual(tree: Tree, stepping: Any, linear: bool) -> Traced:
+    """What accelerations a of the stages leave of their equations, and its derivative by da."""
+    nq, n = tree.coordinates.nq, tree.coordinates.nv
+
+    def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:
+        unknown, call = seeded(a, da), q[0].tape.call
+        values: Values = []
+        slopes: Values = []
+        for state in stepping.stage_states(q, qd, dt[0], unknown, tree.coordinates):
+            x, dx = map(list, zip(*(unknown[0].parts(number) for part in state for number in part)))
+            start = [*q, *qd]
+            qdd = call("directional", [*(start if linear else x), *tau, *dt, *dx], 2 * n)
+            slopes += qdd[n:]
+            if linear:
+                moved = call("directional", [*start, *tau, *dt, *minus(x, start)], 2 * n)
+                qdd = plus(moved, moved[n:])
+            values += qdd[:n]
+        return [*minus(values, a), *minus(slopes, da)]
+
+    sizes = nq, n, n, 1, n * stepping.stages, n * stepping.stages
+    return trace("linear_residual" if linear else "residual", sizes, function)

@@ -10,8 +10,7 @@ evaluations are left; then both at the end. stop: a whole number, which ends all
 from collections.abc import Callable
 from typing import Any
 
-from tmt.derivation.dual import seeded
-from tmt.derivation.vectors import Values, minus, plus
+from tmt.derivation.vectors import Values
 from tmt.methods.implicit import CLOSE, ITERATIONS
 from tmt.methods.stepping import DIVERGED, MANY, NEWTON, SMALL
 from tmt.model.tree import Tree
@@ -133,7 +132,7 @@ class Step:
         directional = forms.directional(self.tree, stepping)
         self.add(directional, width, inline=len(directional.nodes) * stepping.stages <= INLINED)
         for made_linear in (False, True):
-            self.add(residual(self.tree, stepping, made_linear), width, inline=not made_linear)
+            self.add(forms.residual(self.tree, stepping, made_linear), width, inline=not made_linear)
         if "solve" not in {code.name for code in self.functions}:
             self.functions.append(linear.solve())
 
@@ -208,29 +207,6 @@ def squares(state: Value, result: Value, first: int, scales: list[int | None], t
         share = result.load(first + k) / (tolerance * unit)
         total = total + share * share
     return total
-
-
-def residual(tree: Tree, stepping: Any, linear: bool) -> Traced:
-    """What accelerations a of the stages leave of their equations, and its derivative by da."""
-    nq, n = tree.coordinates.nq, tree.coordinates.nv
-
-    def function(q: Values, qd: Values, tau: Values, dt: Values, a: Values, da: Values) -> Values:
-        unknown, call = seeded(a, da), q[0].tape.call
-        values: Values = []
-        slopes: Values = []
-        for state in stepping.stage_states(q, qd, dt[0], unknown, tree.coordinates):
-            x, dx = map(list, zip(*(unknown[0].parts(number) for part in state for number in part)))
-            start = [*q, *qd]
-            qdd = call("directional", [*(start if linear else x), *tau, *dt, *dx], 2 * n)
-            slopes += qdd[n:]
-            if linear:
-                moved = call("directional", [*start, *tau, *dt, *minus(x, start)], 2 * n)
-                qdd = plus(moved, moved[n:])
-            values += qdd[:n]
-        return [*minus(values, a), *minus(slopes, da)]
-
-    sizes = nq, n, n, 1, n * stepping.stages, n * stepping.stages
-    return trace("linear_residual" if linear else "residual", sizes, function)
 
 
 def run(step: Step, advance: Advance) -> Code:

@@ -24,11 +24,11 @@ EDITS = (
     ("joint_map", "within_a_turn", "zero if slides else _1", "_1", "the zero of a slide is turned back"),
     ("robots.placement", "matched_joints", "tree.kind[j] == kind", "True", "joints are matched whatever they are"),
     # the comparison
-    ("agreement.comparison", "Compared.ratio", "share_of(_1, _2)", "share_of(np.where(np.isfinite(_1), _1, 0.0), _2)",
+    ("agreement.values", "Compared.ratio", "share_of(_1, _2)", "share_of(np.where(np.isfinite(_1), _1, 0.0), _2)",
      "NaN agrees"),
     ("agreement.comparison", "Comparison.__init__", "FACTOR * EPS + float(rtol)", "FACTOR * EPS", "rtol is not added"),
     ("comparison", "Comparison.__init__", "FACTOR * EPS + _1", "max(FACTOR, 96) * EPS + _1", "64 eps become 96"),
-    ("agreement.comparison", "Compared.fails", "self.ratio > 1.0", "self.ratio > 2.0", "twice the tolerance agrees"),
+    ("agreement.values", "Compared.fails", "self.ratio > 1.0", "self.ratio > 2.0", "twice the tolerance agrees"),
     ("comparison", "Comparison.table", "self.joints.mass_matrix(values)", "values", "a table of M keeps its joints"),
     ("comparison", "Comparison.take_states", "self.joints.speeds(_1)", "_1", "speeds keep their joints"),
     ("agreement", "assert_agrees", "_1 or comparison.problems", "_1", "a changed argument agrees"),
