@@ -69,7 +69,8 @@ def test_just_inside_and_just_outside_of_the_tolerance(name, rtol, given, monkey
         changed[at] += share * allowed
         worst = differences(**{name: changed}, **states, rtol=rtol)[0]
         assert (worst.ratio <= 1.0) is (share < 1.0) and worst.ratio == pytest.approx(share, rel=1e-2)
-        assert worst.tolerance == pytest.approx(allowed, rel=1e-9)
+        assert worst.tolerance == pytest.approx(allowed, rel=1e-9, abs=0.0)
+        assert worst.difference == pytest.approx(share * allowed, rel=1e-2, abs=0.0)
         if share < 1.0:
             agrees(**{name: changed}, **states, rtol=rtol)
     assert f"{name}: mismatched entries 1 / " in message_of(**{name: changed}, **states, rtol=rtol)

@@ -6,6 +6,8 @@ from models import PATHS
 
 import compare
 import tmt
+from compare.judge.entries import Entries
+from compare.judge.scale import EPS, FACTOR
 
 MJCF = str(PATHS["arm6"])
 TREE = compare.tree(MJCF)
@@ -73,3 +75,13 @@ def test_just_inside_and_just_outside(share, differs):
 
     found = compare.differences(MJCF, coriolis_matrix=off, states=1)
     assert any(x.ratio > 1.0 for x in found if x.quantity == "C qd") == differs
+
+
+def test_the_tolerance_of_dM_dt_is_that_of_twice_the_terms_of_C(rng):
+    q, qd = rng.uniform(-1.0, 1.0, (2, 3, 6))
+    found = compare.differences(MJCF, coriolis_matrix=tmt.coriolis_matrix(TREE, q, qd), q=q, qd=qd)
+    tolerances = {(row.state.number, row.entry): row.tolerance for row in found}
+    names = TREE.joint_names
+    for (s, i, j), terms in np.ndenumerate(Entries(TREE, q, qd).coriolis_matrix):
+        allowed = tolerances[s, f"(C + C')[{names[i]}][{names[j]}]"]
+        assert allowed == pytest.approx(FACTOR * EPS * 2.0 * terms, rel=1e-9, abs=0.0)

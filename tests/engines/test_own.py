@@ -2,6 +2,7 @@
 
 import dataclasses
 import sys
+import time
 import types
 from functools import partial
 
@@ -16,6 +17,7 @@ from compare.engines.tmt import Tmt
 from compare.process.interrupt import Now
 from compare.robots.arm import ARM
 from compare.robots.case import Coordinates
+from compare.robots.joint_map import joint_map
 
 COORDINATES = ARM.coordinates
 TWO = Coordinates(("hip", "knee"))
@@ -231,3 +233,27 @@ def test_a_run_that_diverges_ends_and_its_function_is_not_asked_of_what_is_no_nu
     assert motion.ended[0] is None and motion.ended[1].endswith("s: a number is not finite")
     assert np.isfinite(motion.q[0]).all() and np.isfinite(motion.q[1, 0]).all()
     assert np.isnan(motion.q[1, -1]).all() and own.equations.problems == []
+
+
+def test_jacobians_of_joints_in_another_order_and_sense(rng):
+    def jacobians(own):  # of gamma turned round, alpha and beta
+        T, B = tmt.jacobians(tmt.ARM, np.array([own[1], own[2], -own[0]]))
+        return T[..., [2, 0, 1]] * [-1.0, 1.0, 1.0], B[..., [2, 0, 1]] * [-1.0, 1.0, 1.0]
+
+    joints, q = joint_map(COORDINATES, ["-gamma", "alpha", "beta"]), states(rng)[0]
+    own = OwnEquations({"jacobians": jacobians}, COORDINATES, joints, required=())
+    assert all(map(np.array_equal, own.jacobians(q), tmt.jacobians(tmt.ARM, q)))
+
+
+def test_a_step_of_rk4_asks_four_times():
+    asked = []
+    own = Own(OwnEquations({"acceleration": lambda q, v, tau: asked.append(q) or tau - v}, COORDINATES))
+    motion = own.of(ARM.case()).run(np.zeros(3), [1.0, 2.0, 3.0], np.ones(3), 0.1, 20, "rk4")
+    assert motion.evaluations == len(asked) == 80
+
+
+def test_the_time_of_a_state_is_that_of_all_functions():
+    wait = lambda *state: time.sleep(0.02) or (np.eye(3) if len(state) == 1 else np.zeros(3))  # noqa: E731
+    own = OwnEquations({"mass_matrix": wait, "bias": wait}, COORDINATES)
+    own.try_at(np.zeros((1, 3)), np.zeros((1, 3)), np.zeros((1, 3)))
+    assert 0.04 <= own.seconds < 1.0 and 1 <= own.affordable(1000, 1.0) <= 25

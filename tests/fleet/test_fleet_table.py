@@ -69,6 +69,11 @@ def test_a_file_agrees_differs_breaks_off_or_is_refused(verdict, checks, more, n
     assert row.is_bad is (verdict not in (AGREE, ITSELF, REFUSED))  # the exit status
 
 
+def test_the_largest_share_of_a_tolerance_of_the_models_is_in_the_row():
+    small, large = (("M", value, 2.0, "", "at most", About.MODELS) for value in (0.3, 0.5))
+    assert judged(small, large, OWN).worst_ratio == 0.25 and judged(STILL).worst_ratio is None
+
+
 def limit(dt, stable, integrator="Euler"):
     of_file = {"file_integrator": "Euler", "stable_at_file_dt": stable}
     return SimpleNamespace(integrator=integrator, longest_s=dt, **of_file)

@@ -102,6 +102,13 @@ def test_what_moves_otherwise_is_not_moved_nor_turned(text):
     assert placement.is_same and placement.tree is tmt.ARM and placement.remarks() == []
 
 
+@pytest.mark.parametrize("sideways, is_with", [(0.0, True), (0.002, False)])
+def test_gravity_is_turned_with_a_robot_or_is_another(sideways, is_with):
+    turned = edited(("0 0 -9.81", f"{sideways} 0 -9.81"), text=moved('pos="0 0 0" euler="0 0 0.6"'))
+    placement = placed(tmt.ARM, read(turned).tree)
+    assert placement.is_turned and placement.is_with_gravity is is_with
+
+
 def test_the_anchor_of_a_slide_may_be_anywhere_that_of_a_ball_may_not():
     tree, q = read(CART).tree, np.array([0.3, 0.7, 0.5, 0.5, -0.5, 0.5])
     wrist = CART.replace('pos="0 0.01 0"', 'pos="0 0.02 0"')

@@ -4,6 +4,7 @@ EDITS = (
     ("fleet.table", "judge", "kind in VERDICT_OF", "False", "whatever fails, a file agrees"),
     ("fleet.table", "judge", "min(judged, *_1)", "max(judged, *_1)", "of several verdicts the mildest counts"),
     ("fleet.table", "judge", "said[1:2] if failed['broke'] else []", "[]", "what differs hides what broke off"),
+    ("fleet.table", "judge", "top.over_tolerance", "top.value", "the share of a tolerance is the difference"),
     ("fleet.command", "experiments_of", "EXPERIMENTS[name].runs_file", "False", "a reference spares no question"),
     ("fleet.run", "Run.start", "_1, own_hash, *others", "_1, own_hash", "a file with other parts is a copy"),
     ("process.workers", "Workers.start", "tries <= self.retries", "False", "no killed process is tried again"),

@@ -23,6 +23,7 @@ EDITS = (
     ("joint_map", "JointMap.after", "stated.zero / _1", "stated.zero", "a second zero is in rad where the first joint is in deg"),
     ("joint_map", "within_a_turn", "zero if slides else _1", "_1", "the zero of a slide is turned back"),
     ("robots.placement", "matched_joints", "tree.kind[j] == kind", "True", "joints are matched whatever they are"),
+    ("robots.placement", "SAME", "1e-9", "1e-3", "vectors that differ by a thousandth are the same"),
     # the comparison
     ("agreement.values", "Compared.ratio", "share_of(_1, _2)", "share_of(np.where(np.isfinite(_1), _1, 0.0), _2)",
      "NaN agrees"),
@@ -33,6 +34,8 @@ EDITS = (
     ("comparison", "Comparison.take_states", "self.joints.speeds(_1)", "_1", "speeds keep their joints"),
     ("agreement", "assert_agrees", "_1 or comparison.problems", "_1", "a changed argument agrees"),
     ("agreement", "rows", "-row.ratio", "row.ratio", "the smallest ratio first"),
+    ("agreement", "rows", "yours - right", "right - yours", "differences have the other sign"),
+    ("agreement.comparison", "Comparison.scale", "2.0 * C", "200.0 * C", "the scale of C + C' x 100"),
     ("agreement", "rounded", "worst <= ROUNDED", "True", "a slip small beside the terms is rounding"),
     ("agreement", "rounded", "worst <= ROUNDED", "True", "a small entry may be off by anything"),
     ("agreement", "message", "why.is_found or comparison.rtol", "comparison.rtol", "an rtol is advised beside a cause"),
@@ -72,6 +75,9 @@ EDITS = (
     ("agreement.why", "some_states", "np.flatnonzero(_1)", "np.arange(len(worst))", "causes are sought without values"),
     # of symbols, of what is asked, of tables and gears
     ("own.equations", "OwnEquations.affordable", "int(_1)", "states", "slow equations are asked at all states"),
+    ("own.equations", "OwnEquations.seconds", "sum(_1)", "max(_1)", "the time of a state is that of the slowest function"),
+    ("own.equations", "OwnEquations.jacobians", "self.joints.forces(B)", "B", "B keeps the user's joints"),
+    ("engines.own", "OwnDynamics.prepared", "4 * course.steps", "course.steps", "a step of RK4 has one evaluation"),
     ("own.equations", "OwnEquations.gravity_balance", "self.has('gravity')", "False", "own gravity is not asked"),
     ("engines.own", "OwnDynamics.gravity_balance", "_1 * self.case.scene.gravity", "_1", "gravity stays on in own gravity"),
     ("engines.own", "OwnDynamics.acceleration", "lifted", "0.0", "gravity stays on in own accelerations", 2),
