@@ -160,6 +160,17 @@ def test_steps_from_states_beside_give_what_mjd_transition_fd_gives(name):
     assert np.allclose(np.transpose(columns), A, atol=1e-9)
 
 
+def test_a_step_after_which_mujoco_warns_is_taken_and_the_last_of_its_loop():
+    """A control that is no number counts as 0; the loop goes no further, a watched run does."""
+    motor = HINGE.format('<motor joint="j"/>', "")
+    stepper = Stepper(mujoco.MjModel.from_xml_string(motor), 0.01, "Euler")
+    controls = np.array([[1.0], [2.0], [np.nan], [3.0], [4.0]])
+    watched = [d.qpos.copy() for d in stepper.watch(stepper.start(), 5, controls)]
+    path = stepper.loop(stepper.start(), 5, controls)()
+    assert len(watched) == 5 and stepper.taken(path) == 3
+    assert np.array_equal(path[:3, 1:2], watched[:3]) and (path[3:, 0] == path[2, 0]).all()
+
+
 def test_differences_are_one_sided_at_the_end_of_a_range():
     """A muscle's activation is never below 0, a control never above its range."""
     muscle = '<muscle joint="j" ctrlrange="0 1" lengthrange="0 1"/><motor joint="j" ctrlrange="-1 1"/>'
