@@ -9,7 +9,7 @@ from scipy.integrate import DOP853
 
 import tmt
 from tmt.compiled import forms
-from tmt.derivation import method
+from tmt.derivation import form, method
 from tmt.exact.motion import trajectory
 from tmt.methods import (
     METHODS,
@@ -32,6 +32,20 @@ def test_the_coefficients_of_dop853_are_those_of_scipy():
     assert np.array_equal(dop853.B, DOP853.B) and np.array_equal(dop853.C, DOP853.C)
     assert np.array_equal([*dop853.ERRORS[0], 0.0], DOP853.E5)  # with one of the slope at the end of the step
     assert np.array_equal([*dop853.ERRORS[1], 0.0], DOP853.E3)
+
+
+@pytest.mark.parametrize("name, springs", [("semi_implicit_euler", 0.0), ("discrete", 1.0)])
+def test_each_form_takes_damping_and_springs_at_the_end_of_a_step(name, springs):
+    """(Mbar + dt D + dt^2 k) a = Qbar - dt k qd, solved by NumPy."""
+    tree, dt = tree_of_kinds(np.random.default_rng(5), bodies=5, kinds=("hinge", "slide")), 0.1
+    q, qd, tau = random_state(np.random.default_rng(6), tree)
+    D, k = np.array(tree.damping), np.array(tree.stiffness)
+    force = tau - tmt.bias(tree, q, qd) - D * qd - k * (q - tree.rest)
+    matrix = tmt.mass_matrix(tree, q) + np.diag(dt * D + springs * dt**2 * k)
+    expected = np.linalg.solve(matrix, force - springs * dt * k * qd)
+    for of in (form.LITERAL, form.COMPOSITE, form.ARTICULATED, form.BY_BODIES):
+        found = METHODS[name].slope(tree, q.tolist(), qd.tolist(), tau.tolist(), dt, of)
+        assert np.allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
 def test_methods_keep_their_order_with_balls():

@@ -26,5 +26,6 @@ EDITS = (
     ("engines.outside", "OutsideDynamics.at", "tau - passive(*_1)", "tau", "damping is forgotten"),
     ("outside", "OutsideDynamics.ask", "WorkerEnded", "KeyError", "an engine whose process ends breaks the experiment"),
     ("mujoco.stepper", "Stepper.__init__", "~SLEEP", "-1", "what sleeps stays asleep"),
+    ("mujoco.stepper", "Stepper.taken", "warned + 1", "warned", "a step after which MuJoCo warns is none"),
     ("mujoco.whole", "Whole.__init__", "model.body_treeid >= 0", "model.body_weldid > 0", "a mocap body is a part of the whole"),
 )  # fmt: skip

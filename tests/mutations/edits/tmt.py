@@ -27,6 +27,8 @@ EDITS = (
     ("mujoco.source", "parsed", "floating and not is_urdf(text)", "False", "--floating says nothing of MJCF"),
     ("forms", "directional", "(slope for _, slope in parts)", "(2 * slope for _, slope in parts)", "the Jacobian x 2"),
     ("form", "Implicit.acts_at_single_joints", "not self.bias_rows", "True", "an implicit bias counts as armature"),
+    ("derivation.form", "Form.acceleration", "minus(force, implicit.force)", "force", "implicit springs push no body", 1),
+    ("derivation.form", "Form.acceleration", "plus(armature, _1)", "armature", "implicit damping is no armature"),
     ("runs", "unsound", "angles.compare('lt', LIMIT)", "angles.compare('lt', float('inf'))", "turns have no limit"),
     ("semi_implicit", "SemiImplicitEuler.stiffness_and_damping",
      "(tree.position_gain, tree.speed_gain, _1)", "(tree.speed_gain, tree.position_gain, _1)",
