@@ -1,16 +1,17 @@
 """Equations of motion of rigid bodies on hinges, slides and balls by the TMT method, and their integration.
 
 The first argument of every function is the model, a Tree; `tmt.ARM` is the assignment's arm. States have any
-leading batch shape, one array for each, which broadcast. ValueError, in one line, for wrong shapes, values that
-are not finite, unknown names, a singular Mbar and results beyond the largest double. No physics engine is needed.
+leading batch shape, one array for each, which broadcast. ValueError, in one line, for wrong shapes, values
+that are not finite, unknown names, a singular Mbar and results beyond the largest double. No physics engine
+is needed.
 
 Shapes: q (..., nq), qd and tau (..., nv). Of a hinge or slide one number each, of a ball four (a quaternion
 w, x, y, z of length 1) and three (angular velocity in its own axes, and torque).
 
 Units: rad, s, kg, m, N m, J; of a slide m and N. Frames: the inertial frame, of the arm at the shoulder, x
 north, y west, z up; "body axes" are those that coincide with it at q = 0. Signs: Mbar qdd + h = tau - D qd,
-with h = `bias` (MuJoCo's qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq. In MuJoCo's names tau
-is qfrc_applied, qdd is qacc, and joint damping and springs are in qfrc_passive.
+with h = `bias` (MuJoCo's qfrc_bias) and D the joint damping; `gravity_balance` is +dV/dq. In MuJoCo's names
+tau is qfrc_applied, qdd is qacc, and joint damping and springs are in qfrc_passive.
 
     import numpy as np, tmt
 

@@ -110,7 +110,8 @@ def inverse_dynamics(model: Tree, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -
     """Torque tau = Mbar qdd + h + D qd + k (q - rest) + P q + S qd that gives qdd.
 
     The inverse of `acceleration`; nothing else is added or taken off. With damping, springs and armature it
-    is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. Returns (..., nv), N m; of slides N.
+    is MuJoCo's qfrc_inverse without contacts, limits, friction and actuators. Returns (..., nv), N m; of
+    slides N.
 
     >>> q, qd, tau = np.array([0.5, 0.3, 1.0]), np.ones(3), np.array([1.0, 2.0, 3.0])
     >>> print(tmt.inverse_dynamics(tmt.ARM, q, qd, tmt.acceleration(tmt.ARM, q, qd, tau)).round(9))
@@ -152,8 +153,8 @@ def potential_energy(model: Tree, q: ArrayLike) -> np.ndarray:
 def energy(model: Tree, q: ArrayLike, qd: ArrayLike) -> np.ndarray:
     """Total energy, kinetic and potential; infinite where it is beyond the largest double.
 
-    Its zero is that of `potential_energy`; the model's position_gain adds nothing to it. NaN where all of q is
-    NaN, as it is from where a run of `simulate` has ended early. Returns (...), J.
+    Its zero is that of `potential_energy`; the model's position_gain adds nothing to it. NaN where all of q
+    is NaN, as it is from where a run of `simulate` has ended early. Returns (...), J.
 
     >>> print(tmt.energy(tmt.ARM, [0.0, 0.0, np.pi / 2], [0.0, 0.0, 2.0]).round(9))  # -9.4176 + 0.05275 2^2 / 2
     -9.3121

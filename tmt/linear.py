@@ -28,11 +28,11 @@ def derivatives(model: Tree, q: ArrayLike, qd: ArrayLike, tau: ArrayLike) -> Der
     """Exact derivatives of `acceleration` by q, qd and tau, and of `inverse_dynamics` by q and qd.
 
     Those of the inverse dynamics are at qdd = acceleration(q, qd, tau): dqdd/dq = -Mbar^-1 dtau/dq, and so by
-    qd; dqdd/dtau = Mbar^-1. By q means by tangent vectors: of a hinge or slide by its number in q; of a ball by
-    turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
+    qd; dqdd/dtau = Mbar^-1. By q means by tangent vectors: of a hinge or slide by its number in q; of a ball
+    by turns about its own three axes, for which its quaternion p changes by p o (0, u) / 2; of a free joint,
     three slides and a ball, by the position of its origin in the inertial frame, then by turns in its own
-    axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so.
-    Returns Derivatives of five arrays (..., nv, nv), the derivative of row i by column j.
+    axes. MuJoCo's mj_integratePos moves so, and mjd_transitionFD differentiates so. Returns Derivatives of
+    five arrays (..., nv, nv), the derivative of row i by column j.
 
     >>> q, rest = np.array([0.0, 0.0, np.pi / 2]), np.zeros(3)
     >>> by = tmt.derivatives(tmt.ARM, q, rest, rest)  # the arm hangs
@@ -48,7 +48,8 @@ def inverse_dynamics_derivatives(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Exact derivatives of `inverse_dynamics` by q and by qd.
 
-    By q means by tangent vectors, see `derivatives`; the derivative by qdd is `mass_matrix`. MuJoCo: mjd_inverseFD.
+    By q means by tangent vectors, see `derivatives`; the derivative by qdd is `mass_matrix`. MuJoCo:
+    mjd_inverseFD.
 
     Returns
     -------

@@ -60,8 +60,8 @@ def simulate(
     model : Tree
     q, qd : (..., nq) and (..., nv), rad and rad/s, state at t = 0
     tau : (..., nv), N m, constant; or a function of (t, q, qd), which is asked with one state and returns (nv,)
-        One that is linear in q and qd becomes gains of the model: compiled, and taken implicitly by implicit methods.
-        Any other is asked at each stage, of a method with fixed steps that solves nothing.
+        One that is linear in q and qd becomes gains of the model: compiled, and taken implicitly by implicit
+        methods. Any other is asked at each stage, of a method with fixed steps that solves nothing.
     dt : float, s, step, above 0
     steps : int, how many, at least 1
     method : str, a key of METHODS, or "taylor": the true motion, rounded once, by a series in pairs of doubles

@@ -1,8 +1,9 @@
 """Comparison of your equations with MuJoCo, entry by entry, for use in your tests.
 
-The tolerance of an entry is 64 eps x its scale + rtol x the largest value that it has at the states. The scale
-is the sum of the absolute values of its terms, see judge/entries.py, not the entry itself, which may be a small
-difference of large terms. A value near zero, such as that of gravity at a posture, is judged as the others.
+The tolerance of an entry is 64 eps x its scale + rtol x the largest value that it has at the states. The
+scale is the sum of the absolute values of its terms, see judge/entries.py, not the entry itself, which may be
+a small difference of large terms. A value near zero, such as that of gravity at a posture, is judged as the
+others.
 """
 
 from __future__ import annotations  # so that help() shows the short names of types
@@ -89,16 +90,17 @@ def assert_agrees(
     mjcf : path, MJCF text or MjModel
         Its contacts, limits, actuators and equalities are switched off.
     mass_matrix, bias, coriolis_matrix, gravity, acceleration : optional, at least one
-        mass_matrix(q), bias(q, qd), coriolis_matrix(q, qd), gravity(q), acceleration(q, qd, tau): a function of one
-        state, the array of its values at the given q, qd, tau, or a pair of a SymPy matrix and its list of symbols.
-        Of a Coriolis matrix C, which M and h do not determine, C qd is compared with bias - gravity, and C + C' with
-        dM/dt: dM/dt - 2 C is then skew.
+        mass_matrix(q), bias(q, qd), coriolis_matrix(q, qd), gravity(q), acceleration(q, qd, tau): a function
+        of one state, the array of its values at the given q, qd, tau, or a pair of a SymPy matrix and its
+        list of symbols. Of a Coriolis matrix C, which M and h do not determine, C qd is compared with bias -
+        gravity, and C + C' with dM/dt: dM/dt - 2 C is then skew.
     q, qd, tau : (N, nq), (N, nv), (N, nv), optional
         The states, in your joints; None: `states` random states from `seed`, within the joints' ranges.
     joints : sequence of str, optional
         The joints as your equations take them: ["knee", "-hip", "ankle+90deg"]; None: those of the model.
     rtol : float, default 0
-        Added to the tolerance, relative to the largest value of each entry, for equations with rounded constants.
+        Added to the tolerance, relative to the largest value of each entry, for equations with rounded
+        constants.
     states, seed : int, default 100 and 0
         Number and seed of the random states.
 

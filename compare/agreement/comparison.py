@@ -1,7 +1,7 @@
 """The arguments of assert_agrees, validated, and each quantity of the user and of MuJoCo at the states.
 
-Of a Coriolis matrix C, which Mbar and h do not determine, two quantities are compared: C qd, and C + C' = dMbar/dt, which
-says that dMbar/dt - 2 C is skew.
+Of a Coriolis matrix C, which Mbar and h do not determine, two quantities are compared: C qd, and C + C' =
+dMbar/dt, which says that dMbar/dt - 2 C is skew.
 """
 
 import warnings
@@ -50,8 +50,9 @@ def origin_of(mjcf: Any) -> Any:
 class Comparison:
     """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`.
 
-    brought: what is given. values, right, tolerances: of each quantity in the model's joints, (states, ...). compared: the
-    same in the user's. coriolis: the user's matrix. problems: other errors of the user's functions, a line each.
+    brought: what is given. values, right, tolerances: of each quantity in the model's joints, (states, ...).
+    compared: the same in the user's. coriolis: the user's matrix. problems: other errors of the user's
+    functions, a line each.
     """
 
     def __init__(

@@ -106,7 +106,8 @@ def say(finding: Finding | str) -> str:
 def parts(finding: Finding | str) -> tuple[str, list[list[str]], str]:
     """The sentences of a finding before a table, the rows of the table, and the sentences after it.
 
-    Lines of the template that begin with "|" are the rows, the first one the head: cells are separated by "|".
+    Lines of the template that begin with "|" are the rows, the first one the head: cells are separated by
+    "|".
     """
     if isinstance(finding, str):
         return finding, [], ""

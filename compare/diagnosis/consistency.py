@@ -1,7 +1,8 @@
 """Whether Mbar and h can belong together, whatever the model is; no reference is needed.
 
-Mbar must be symmetric and positive definite, h - h(q, 0) quadratic in the speeds. Noise in the values (single precision,
-interpolated tables) is measured first, by differences of sixth order over short steps, and added to every tolerance.
+Mbar must be symmetric and positive definite, h - h(q, 0) quadratic in the speeds. Noise in the values (single
+precision, interpolated tables) is measured first, by differences of sixth order over short steps, and added
+to every tolerance.
 """
 
 from collections.abc import Callable, Sequence
@@ -125,7 +126,8 @@ def follows_from(mass_matrix: OfPositions, q: ndarray, qd: ndarray, velocity_ter
         size = np.max([np.abs(value) for value in values.values()], axis=0)
         right += qd[:, k : k + 1] * np.einsum("sij,sj->si", slope, qd)
         right[:, k] -= np.einsum("si,sij,sj->s", qd, slope, qd) / 2.0
-        # a sixteenth of the difference would do where it is smooth; with noise it is as large as the difference
+        # a sixteenth of the difference would do where it is smooth; with noise it is as large as the
+        # difference
         error = SAFETY * np.abs(slope - coarse) + ROUNDED * size / STEP
         allowed += error.max(axis=(1, 2)) * rates**2
     return bool((np.abs(velocity_terms - right) <= allowed[:, None]).all())

@@ -54,7 +54,8 @@ class Fitted(NamedTuple):
 class Family(NamedTuple):
     """Hypotheses, all open or all complete, with the coefficients of the values in each one's change over its size.
 
-    (n, states, entries); exact for all except directions and zeros. Of complete ones the first is what they add.
+    (n, states, entries); exact for all except directions and zeros. Of complete ones the first is what they
+    add.
     """
 
     hypotheses: list[Hypothesis]

@@ -1,8 +1,8 @@
 """One way in which equations can be wrong: a cause, and what it changes in the values of Mbar and h.
 
-All kinds have this form. A hypothesis is open, as "mass of forearm", until a number is fitted, or it is complete,
-as "masses exchanged", and its change is 1. Its cost is stated where it is made: of several explanations that with
-the fewer and rounder numbers, and the commoner slip, is named first.
+All kinds have this form. A hypothesis is open, as "mass of forearm", until a number is fitted, or it is
+complete, as "masses exchanged", and its change is 1. Its cost is stated where it is made: of several
+explanations that with the fewer and rounder numbers, and the commoner slip, is named first.
 """
 
 from dataclasses import replace

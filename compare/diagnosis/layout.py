@@ -37,8 +37,8 @@ class Entry(NamedTuple):
 class Layout(NamedTuple):
     """What stands in a row of values: Mbar by rows, then h, or its velocity terms and h at rest.
 
-    With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone. with_forces: whether h is what
-    accelerations leave beside the damping and springs of the model.
+    With accelerations qdd (states, nv) these are the forces Mbar qdd + h alone. with_forces: whether h is
+    what accelerations leave beside the damping and springs of the model.
     """
 
     nv: int

@@ -1,6 +1,6 @@
 """Several numbers at once, by regression: the ten inertial numbers of a body, in which Mbar and h are linear; the
-same number of all joints or bodies; the three components of an offset or a CoM. One number in values with noise,
-as of a log, with its uncertainty.
+same number of all joints or bodies; the three components of an offset or a CoM. One number in values with
+noise, as of a log, with its uncertainty.
 """
 
 from collections.abc import Iterator, Sequence

@@ -63,8 +63,9 @@ def diagnose(
 
     seconds: for the search. bias: the given h at the same q and other speeds, and mass_matrix: the given Mbar
     at other q, if there are functions. stated: how the joints were stated, which may be wrong; None: they
-    cannot be. qdd: accelerations, of which the given h are the forces Mbar qdd + h. with_forces: whether h is what
-    accelerations leave beside the model's damping and springs, which are then in the convention of the joints too.
+    cannot be. qdd: accelerations, of which the given h are the forces Mbar qdd + h. with_forces: whether h is
+    what accelerations leave beside the model's damping and springs, which are then in the convention of the
+    joints too.
     """
     with np.errstate(all="ignore"):  # values may be no numbers, or beyond the largest
         given = Given(tree, values, bias, mass_matrix, qdd=qdd, with_forces=with_forces)

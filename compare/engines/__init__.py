@@ -4,11 +4,12 @@ The module has
 
     engine(schemes) -> Engine    the engine, for a robot on which MuJoCo's integrators are these schemes
 
-unless its record says from_file, where run.reference makes an engine of a file of the user's, or reads_file: see engines.outside.
+unless its record says from_file, where run.reference makes an engine of a file of the user's, or reads_file:
+see engines.outside.
 
-An engine gives the dynamics of a case; it applies gravity, damping, locked joints and torques itself. Dynamics take positions
-q (..., nq), speeds v (..., nv) and torques tau (..., nv) in rad, rad/s and N m, of any leading batch shape, with joints in the
-order of the case; and Mbar a + bias = tau - D v.
+An engine gives the dynamics of a case; it applies gravity, damping, locked joints and torques itself.
+Dynamics take positions q (..., nq), speeds v (..., nv) and torques tau (..., nv) in rad, rad/s and N m, of
+any leading batch shape, with joints in the order of the case; and Mbar a + bias = tau - D v.
 """
 
 import importlib

@@ -17,7 +17,8 @@ from . import Course, Engine, Method, Motion, Prepared
 from .scipy import ScipyDynamics, of_length_1
 
 FULL = 1e-15  # tolerance: all digits of a double
-# of the accelerations: heyoka's compilation takes longer than in proportion, 15 s for 290 of them, 266 s for 2479
+# of the accelerations: heyoka's compilation takes longer than in proportion, 15 s for 290 of them, 266 s for
+# 2479
 MOST_OPERATIONS = 600
 MOST_JOINTS = 12  # for more the operations are not counted
 

@@ -1,7 +1,8 @@
 """Newton on the CPU, which reads MJCF itself; its numbers are float32.
 
-Its coordinates differ from MuJoCo's: slides before hinges in a body; no `ref`; quaternions x y z w; a ball's angular velocity in
-the axes of its joint; of a free body the velocity of its centre of mass and the angular velocity in world axes.
+Its coordinates differ from MuJoCo's: slides before hinges in a body; no `ref`; quaternions x y z w; a ball's
+angular velocity in the axes of its joint; of a free body the velocity of its centre of mass and the angular
+velocity in world axes.
 """
 
 from collections.abc import Callable

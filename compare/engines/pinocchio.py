@@ -1,6 +1,7 @@
 """Pinocchio: its model of a robot's file.
 
-A continuous joint has the cosine and the sine of its angle. Of several root bodies it reads the first one only.
+A continuous joint has the cosine and the sine of its angle. Of several root bodies it reads the first one
+only.
 """
 
 import numpy as np

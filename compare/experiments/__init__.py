@@ -1,7 +1,7 @@
 """The experiments: a row of EXPERIMENTS for each word of the command line.
 
-An experiment is a row and a module, or a folder, of its name, which has functions: see Functions. The module is
-imported only where the experiment runs. Its text is NAME.md.jinja: a macro for its help, title, claim and
+An experiment is a row and a module, or a folder, of its name, which has functions: see Functions. The module
+is imported only where the experiment runs. Its text is NAME.md.jinja: a macro for its help, title, claim and
 tolerance, and for each kind of finding and caption.
 """
 

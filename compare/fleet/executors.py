@@ -63,8 +63,8 @@ def memory_of_machine() -> int:
 class Pool:
     """Processes of this machine.
 
-    limit: s for a call; memory: bytes, by default its share; folder: for temporary files; loaded: modules that
-    each process has from its beginning.
+    limit: s for a call; memory: bytes, by default its share; folder: for temporary files; loaded: modules
+    that each process has from its beginning.
     """
 
     def __init__(

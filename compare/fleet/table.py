@@ -79,7 +79,8 @@ FLEET_COLUMNS = tuple(name for name in FileRow(file="", verdict="").columns() if
 def judge(row: FileRow, report: Report, reference: Reference) -> None:
     """Set the verdict, reason, largest share of a tolerance, and step of a row.
 
-    The reason is the cause of what differs, else the first check of each other kind, and joints of other names.
+    The reason is the cause of what differs, else the first check of each other kind, and joints of other
+    names.
     """
     sections = report.sections
     failed, top = failures(sections), worst(sections)

@@ -12,14 +12,13 @@ maximum; its tolerance is 64 eps x scale. For a body with mass m and inertia I a
     (6)  h_i = sum of k (t_i m (2 S w + g) + u_i (m V^2 + |I| S^2))
 
 W is the largest distance of the body from the centre of mass of all, at the states: MuJoCo adds moments about
-the centre of mass of what hangs on one body of the world, and a Tree does not tell which branches do. Four terms
-of m W^2 (of the inertia, twice of the moment, and of the mass) cancel down to m L_i^2; each is rounded by
-eps m W^2, together by 64 eps m (W / 4)^2.
-R is the largest distance of the body from the world's origin. Its position, and so each of its levers, is
-rounded by eps R, which is 64 eps (R / 64).
-k is the number of hinges and balls that turn the body, at least 1: each turn passes on the rounding of those
-before it and adds its own. Where MuJoCo fuses bodies, one after another, each sum is turned into its principal
-axes and back: k is then multiplied by the number of bodies that are fused.
+the centre of mass of what hangs on one body of the world, and a Tree does not tell which branches do. Four
+terms of m W^2 (of the inertia, twice of the moment, and of the mass) cancel down to m L_i^2; each is rounded
+by eps m W^2, together by 64 eps m (W / 4)^2. R is the largest distance of the body from the world's origin.
+Its position, and so each of its levers, is rounded by eps R, which is 64 eps (R / 64). k is the number of
+hinges and balls that turn the body, at least 1: each turn passes on the rounding of those before it and adds
+its own. Where MuJoCo fuses bodies, one after another, each sum is turned into its principal axes and back: k
+is then multiplied by the number of bodies that are fused.
 
 A derivative by the movement of joint j changes at most four factors of a term, a lever and those of an
 acceleration. A turn changes each by its own size: the scale of d(Mbar qdd + h)/dq_j is four times that of the

@@ -78,8 +78,8 @@ def has_mark(path: Path, mark: str) -> bool:
 def why_not(path: Path, needed: Iterable[Path], reserved: Iterable[Path], mark: str) -> str:
     """Why a file cannot be written to a path, as a key or as the system says it; "" if it can.
 
-    needed: files that are never written to. reserved: files and folders that something else replaces. mark: in the
-    first line of what may be replaced.
+    needed: files that are never written to. reserved: files and folders that something else replaces. mark:
+    in the first line of what may be replaced.
     """
     assets = assets_of(path)
     try:

@@ -1,9 +1,9 @@
 """A run in a child process, and its end by Ctrl-C, SIGTERM or SIGHUP with status 2, whatever it is doing.
 
-The parent hears the signals at once, also while the child computes in C. It passes them on as SIGTERM, which is
-a KeyboardInterrupt in the child: that writes what is finished and clears up. A child that does not answer is
-killed, with all that a user's own code has started. That it has come to its end is a message, which an exit
-status cannot forge.
+The parent hears the signals at once, also while the child computes in C. It passes them on as SIGTERM, which
+is a KeyboardInterrupt in the child: that writes what is finished and clears up. A child that does not answer
+is killed, with all that a user's own code has started. That it has come to its end is a message, which an
+exit status cannot forge.
 """
 
 import os

@@ -111,7 +111,8 @@ def page_of(
 ) -> str:
     """A document in Markdown as a page.
 
-    links: its sections, and whether something fails there; folder: where its figures are, which the page has inside.
+    links: its sections, and whether something fails there; folder: where its figures are, which the page has
+    inside.
     """
     html = MarkdownIt("commonmark", {"html": True}).enable("table").render(text)
     if folder:

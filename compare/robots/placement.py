@@ -1,8 +1,9 @@
 """Two files of one robot: which joints are the same, and where frames may lie without another motion.
 
-Joints are the same by name, else by their order among those of their kind. The anchor of a hinge may lie anywhere
-on its axis, that of a slide anywhere: the stated ones are put at the foot of the perpendicular from the file's.
-Frames may be parallel at any position of the joints, and the robot with its gravity may be moved and turned.
+Joints are the same by name, else by their order among those of their kind. The anchor of a hinge may lie
+anywhere on its axis, that of a slide anywhere: the stated ones are put at the foot of the perpendicular from
+the file's. Frames may be parallel at any position of the joints, and the robot with its gravity may be moved
+and turned.
 """
 
 from collections.abc import Iterator, Sequence

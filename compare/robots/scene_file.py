@@ -56,8 +56,8 @@ def read_scenes(path: str | Path, robot: Robot) -> tuple[Scene, ...]:
 def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict[str, np.ndarray]:
     """The columns of a CSV file: time, s, from 0 on, and controls by the names of actuators.
 
-    dt: s, the step of the file, of which the times may be MOST_STEPS. SceneError, in one line with the column or
-    the row, for what is no table of such numbers, and for a file without actuators.
+    dt: s, the step of the file, of which the times may be MOST_STEPS. SceneError, in one line with the column
+    or the row, for what is no table of such numbers, and for a file without actuators.
     """
     if not actuators:
         raise SceneError(f"{path}: controls of no actuator: the file has none")

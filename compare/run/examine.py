@@ -52,8 +52,8 @@ class Run:
     """The experiments of one run. clock: of the workers, it measures each experiment.
 
     An experiment that raises is one failed check; the others go on. The diagnosis runs, among others, only if
-    one of them fails. Of several each has a line on the terminal; from the first that differs on they wait for
-    the causes.
+    one of them fails. Of several each has a line on the terminal; from the first that differs on they wait
+    for the causes.
     """
 
     names: Sequence[str]
@@ -244,8 +244,8 @@ def lines_of(cause: Cause) -> list[str]:
 def causes(setup: Setup, sections: Sequence[Section]) -> tuple[list[Cause], int]:
     """What explains that experiments differ, searched for once; the states at which M and h agree without it, 0: not known.
 
-    Where numbers are stated they are those that differ; one convention, number or slip that explains those in M
-    and h stands in their place. Else they are what the search finds, and the numbers at other places.
+    Where numbers are stated they are those that differ; one convention, number or slip that explains those in
+    M and h stands in their place. Else they are what the search finds, and the numbers at other places.
     """
     if not failures(sections)["differing"]:
         return [], 0

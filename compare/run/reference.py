@@ -81,11 +81,11 @@ def compared_with(
 ) -> Compared:  # fmt: skip
     """A file (None: the arm's) and the reference that --reference asks for.
 
-    asked: "arm", "model", another robot's file or own equations; None: the arm for a file with its hinges, else
-    model. joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its path;
-    solution: the path of the other robot's file, if not `asked`; floating: the base of a URDF has a free joint.
-    ModelError, in one line, for a file that cannot be compared, JointsDiffer for different joints,
-    OwnError for equations that cannot be used.
+    asked: "arm", "model", another robot's file or own equations; None: the arm for a file with its hinges,
+    else model. joints: of own equations, with commas, see joint_map; shown: the name of the file, if not its
+    path; solution: the path of the other robot's file, if not `asked`; floating: the base of a URDF has a
+    free joint. ModelError, in one line, for a file that cannot be compared, JointsDiffer for different
+    joints, OwnError for equations that cannot be used.
     """
     source, shown = Source(Path(path or ARM.mjcf), floating), in_one_line(shown or path or "mjcf/arm.xml")
     if asked == "arm" or (asked is None and (path is None or has_hinges(source, ARM.joints))):

@@ -29,14 +29,16 @@ EARTH = 30.0  # m/s2: a larger gravity is stated in another unit of length
 class StepLimitRow(Row):
     """The longest stable step of an integrator, or the longest period of a program, after a push: step_limits.csv.
 
-    Speeds are in rad/s or m/s, distances in rad or m, of joints and free bodies, in the file's unit of length. stable_up_to_s:
-    None: no step down to fine_dt_s; fails_at_s: None: all that are tried hold. moves_first: the joint of the run that fails.
-    end_speed: the largest in the last quarter of the runs, at the step in use and at fine steps. apart: the largest distance
-    from fine runs on the way, at the step in use; within_error_s: the longest step that stays within --error.
-    judged_by: rest; speed, it coasts or is in motion; divergence, it moves on by itself; falls, a stated push is survived at no
-    step; "", no fine run is finite. outcome: of the step in use: holds, moves, grows, elsewhere, diverges. survived: the largest
-    push that fine runs survive of those that were tried. fine_apart: of two fine steps. kept: the share of the speed of fine
-    runs that is left at the step in use, where they coast. creep: of the fine run without a push.
+    Speeds are in rad/s or m/s, distances in rad or m, of joints and free bodies, in the file's unit of
+    length. stable_up_to_s: None: no step down to fine_dt_s; fails_at_s: None: all that are tried hold.
+    moves_first: the joint of the run that fails. end_speed: the largest in the last quarter of the runs, at
+    the step in use and at fine steps. apart: the largest distance from fine runs on the way, at the step in
+    use; within_error_s: the longest step that stays within --error. judged_by: rest; speed, it coasts or is
+    in motion; divergence, it moves on by itself; falls, a stated push is survived at no step; "", no fine run
+    is finite. outcome: of the step in use: holds, moves, grows, elsewhere, diverges. survived: the largest
+    push that fine runs survive of those that were tried. fine_apart: of two fine steps. kept: the share of
+    the speed of fine runs that is left at the step in use, where they coast. creep: of the fine run without a
+    push.
     """
 
     posture: str
@@ -103,8 +105,9 @@ class TriedRow(Row):
 class Question(NamedTuple):
     """What is asked of a posture.
 
-    dt, s, integrator: of the step in use. push: None: the usual one. error: rad or m. recorded: controls, see motion_of.
-    control_period, delay: s, of a program; kp, kv: its gains. drawn: with the pushes of the picture; helped: with remedies.
+    dt, s, integrator: of the step in use. push: None: the usual one. error: rad or m. recorded: controls, see
+    motion_of. control_period, delay: s, of a program; kp, kv: its gains. drawn: with the pushes of the
+    picture; helped: with remedies.
     """
 
     dt: float
@@ -124,9 +127,9 @@ class Question(NamedTuple):
 class Answer(NamedTuple):
     """Rows, in the order of the integrators; steps that were tried; remedies; what stops a creep.
 
-    recipes: of the runs at the longest stable step in use, and at the first that fails.
-    smaller: where the step in use fails, the largest smaller push after which the limit is longer, and that limit.
-    light: of joints that move first, see light_joints.
+    recipes: of the runs at the longest stable step in use, and at the first that fails. smaller: where the
+    step in use fails, the largest smaller push after which the limit is longer, and that limit. light: of
+    joints that move first, see light_joints.
     """
 
     rows: list[StepLimitRow]

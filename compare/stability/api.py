@@ -59,32 +59,38 @@ def step_limits(
 ) -> StepLimits:
     """Return the longest stable step of each integrator of MuJoCo: at which a push is survived.
 
-    Everything acts as the file has it. The robot starts where the file does, every speed is changed by the push, in four
-    patterns of signs, and a step holds if the runs of 3 s end as still as runs of fine steps do, and where they do.
+    Everything acts as the file has it. The robot starts where the file does, every speed is changed by the
+    push, in four patterns of signs, and a step holds if the runs of 3 s end as still as runs of fine steps
+    do, and where they do.
 
     Parameters
     ----------
     mjcf : str, path or mujoco.MjModel
         A path, MJCF text, or a compiled model, of which a copy is taken: change gains in a loop.
     posture : str or (nq,) numbers, optional
-        The name of a keyframe, "qpos0", or positions (deg, m, quaternions). By default the first keyframe, else qpos0.
+        The name of a keyframe, "qpos0", or positions (deg, m, quaternions). By default the first keyframe,
+        else qpos0.
     push : float, optional
-        rad/s or m/s, of every speed. By default 0.1, or the largest smaller one that is survived at fine steps.
+        rad/s or m/s, of every speed. By default 0.1, or the largest smaller one that is survived at fine
+        steps.
     error : float, optional
         rad or m: `within_error_s` is the longest step that stays so near the run of fine steps.
     control_period, delay : float, optional
-        s: a program has the servos, reads every period, and acts a delay later; `stable_up_to_s` is the longest period.
+        s: a program has the servos, reads every period, and acts a delay later; `stable_up_to_s` is the
+        longest period.
     kp, kv : float, optional
         Gains of a program that drives the motors: control kp (posture - length) - kv speed.
     controls : mapping or path, optional
-        "time" (s, from 0 on) and controls by the names of actuators, or a CSV file of these: the step is judged along it.
+        "time" (s, from 0 on) and controls by the names of actuators, or a CSV file of these: the step is
+        judged along it.
     integrators : sequence of str, optional
         Such as ("Euler", "implicitfast"). By default all of MuJoCo's.
 
     Returns
     -------
     StepLimits
-        A row for each integrator: limits["implicitfast"].stable_up_to_s, see StepLimitRow; to_frame() for pandas.
+        A row for each integrator: limits["implicitfast"].stable_up_to_s, see StepLimitRow; to_frame() for
+        pandas.
 
     Raises
     ------

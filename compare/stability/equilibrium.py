@@ -20,8 +20,9 @@ NEGLIGIBLE = 1e-6  # relative to the fastest mode: a rate below is zero
 class Equilibrium:
     """A posture at rest under its holding torque.
 
-    matrix: d(qd, qdd)/d(q, qd), (2n, 2n). rates: its eigenvalues, 1/s, the largest real part first; vectors: their
-    eigenvectors in columns, and shapes with a largest angle of 1 rad. small: below this a rate is zero, 1/s.
+    matrix: d(qd, qdd)/d(q, qd), (2n, 2n). rates: its eigenvalues, 1/s, the largest real part first; vectors:
+    their eigenvectors in columns, and shapes with a largest angle of 1 rad. small: below this a rate is zero,
+    1/s.
     """
 
     def __init__(self, case: Case) -> None:

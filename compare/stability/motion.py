@@ -54,9 +54,9 @@ def posture_of(asked: str | Sequence[float], reading: Reading) -> Posture:
 class Motion(NamedTuple):
     """A motion of a model from a state of a Stepper.
 
-    controls: who gives them: the "keyframe", "servos" that hold the posture, a "record", a "program", or "" where nothing acts.
-    times, recorded: (n,) s and (n, nu). program: it reads at a period, which is that of a run; ideal: the same
-    law in actuators of MuJoCo, which act at once.
+    controls: who gives them: the "keyframe", "servos" that hold the posture, a "record", a "program", or ""
+    where nothing acts. times, recorded: (n,) s and (n, nu). program: it reads at a period, which is that of a
+    run; ideal: the same law in actuators of MuJoCo, which act at once.
     """
 
     model: mujoco.MjModel
@@ -73,8 +73,8 @@ class Motion(NamedTuple):
     ) -> Iterator[tuple[int, np.ndarray | None]]:
         """The parts of a run of `count` steps: their steps, and their controls, (steps, nu), None: those of the state.
 
-        The stepper's data are at the start of each part. period, delay: of a program, s: it reads so often, and its controls act
-        so much later; 0.0: every step, at once.
+        The stepper's data are at the start of each part. period, delay: of a program, s: it reads so often,
+        and its controls act so much later; 0.0: every step, at once.
         """
         dt, done, end, every = stepper.dt, 0, 0, max(1, round(period / stepper.dt))
         late, waiting = int(np.ceil(delay / dt - EARLY)), list[tuple[int, np.ndarray]]()
@@ -103,8 +103,8 @@ def motion_of(
 ) -> Motion:  # fmt: skip
     """The motion of a file from a posture, see Stepper.start for its controls.
 
-    recorded: "time", s, and controls by the names of actuators, each until the next one. in_program: a program has the file's
-    servos or, with gains kp, kv, its motors. ValueError: there are none of them.
+    recorded: "time", s, and controls by the names of actuators, each until the next one. in_program: a
+    program has the file's servos or, with gains kp, kv, its motors. ValueError: there are none of them.
     """
     model, stepper = reading.model, Stepper(reading.model, reading.dt, reading.integrator)
     state, place = stepper.start(posture.key, q=posture.q or None), stepper.places["ctrl"]

@@ -11,11 +11,11 @@
 - The longest step that is found is tried with eight further patterns, in longer runs, and so is one that is shorter
   by 6 %. 8 % above the one that fails, a third of all patterns fail: in between it depends on the push.
 - A step holds if after each pattern the run is as still at its end as fine runs are, grows no more, and ends where
-  they do; what is free may slide and turn on its floor. Where fine runs of two steps or patterns end elsewhere the
-  place is chance, and is not judged.
+  they do; what is free may slide and turn on its floor. Where fine runs of two steps or patterns end
+  elsewhere the place is chance, and is not judged.
 - What coasts (no damping, a keyframe with speeds, recorded controls) is judged joint by joint: nowhere faster than
-  three times the fine run, or the push. What moves on by itself is judged by divergence alone: not finite, or ten
-  times as fast as fine runs.
+  three times the fine run, or the push. What moves on by itself is judged by divergence alone: not finite, or
+  ten times as fast as fine runs.
 """
 
 from collections.abc import Iterator
@@ -40,9 +40,9 @@ WITHIN = 1.06  # fold
 class Verdict(NamedTuple):
     """What runs of a step show.
 
-    why: how it fails, diverges, moves, grows or elsewhere; "": it holds. way: the pattern of signs that decides; dof: what
-    moves first. speed: the largest at the end; apart: from fine runs, on the way. kept: the largest share of the speed of fine
-    runs that coast, else None.
+    why: how it fails, diverges, moves, grows or elsewhere; "": it holds. way: the pattern of signs that
+    decides; dof: what moves first. speed: the largest at the end; apart: from fine runs, on the way. kept:
+    the largest share of the speed of fine runs that coast, else None.
     """
 
     why: str
@@ -182,8 +182,9 @@ class Pushed(Runs):
     def further(self, trial: Trial, ways: range) -> Iterator[tuple[str, int, int, float]]:
         """How runs of further patterns fail, or "", the pattern, what moves first, and the speed at the end.
 
-        They are judged beside the fine runs of the first patterns, of which the fastest counts; what fails, also beside that
-        of its own pattern: which way it tumbles, and whether it topples at any step, depends on the push.
+        They are judged beside the fine runs of the first patterns, of which the fastest counts; what fails,
+        also beside that of its own pattern: which way it tumbles, and whether it topples at any step, depends
+        on the push.
         """
         push, fine = trial.push, self.fine_runs(trial.push)
         most, last = (np.max([getattr(run, name) for run in fine], axis=0) for name in ("most", "last"))
@@ -223,8 +224,9 @@ class Pushed(Runs):
     def limit(self, push: float, integrator: str, surely: bool = True) -> Limit:
         """The longest step after a push, from the step in use upwards or downwards.
 
-        surely: it, and one that is shorter by BELOW, hold after further patterns too, and so does the one in use; a factor
-        ABOVE above the one that fails, a third of all patterns fail. Between both it depends on the push.
+        surely: it, and one that is shorter by BELOW, hold after further patterns too, and so does the one in
+        use; a factor ABOVE above the one that fails, a third of all patterns fail. Between both it depends on
+        the push.
         """
 
         def trial(dt: float) -> Trial:

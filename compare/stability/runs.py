@@ -35,9 +35,9 @@ class Trial(NamedTuple):
 class Run(NamedTuple):
     """A run of a motion.
 
-    last, most: the largest speed of each degree of freedom in the last quarter and of all, (nv,); inf where the run diverges.
-    middle, late: the largest of all speeds in the middle and in the last third. times, q: states, (n,) s and (n, nq). speeds:
-    of all steps, (steps, nv); of a fine run after a push none.
+    last, most: the largest speed of each degree of freedom in the last quarter and of all, (nv,); inf where
+    the run diverges. middle, late: the largest of all speeds in the middle and in the last third. times, q:
+    states, (n,) s and (n, nq). speeds: of all steps, (steps, nv); of a fine run after a push none.
     """
 
     last: np.ndarray

@@ -10,7 +10,8 @@ def largest(
 ) -> tuple[float | None, float | None]:
     """Return the largest number that holds and the smallest that fails, a factor of at most `within` apart.
 
-    From `first` upwards by factors of RATIO to what fails, or downwards to what holds, then by bisection of the logarithm.
+    From `first` upwards by factors of RATIO to what fails, or downwards to what holds, then by bisection of
+    the logarithm.
 
     Parameters
     ----------

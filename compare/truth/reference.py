@@ -1,7 +1,8 @@
 """Reference runs for errors: Taylor's method in pairs of doubles, for any robot and any scene.
 
-A second run with another form of the equations and another order gives the accuracy. Where a series takes too long, as
-for a stiff robot, the reference is a run in doubles of order 8. Halving its steps gives its accuracy.
+A second run with another form of the equations and another order gives the accuracy. Where a series takes too
+long, as for a stiff robot, the reference is a run in doubles of order 8. Halving its steps gives its
+accuracy.
 """
 
 import io

@@ -2,8 +2,8 @@
 
 A hinge has an angle and its rate, a slide a length and its rate. A ball has a quaternion (w, x, y, z), which
 turns components in its own frame to components in that of its parent, and three speeds: its angular velocity
-in its own frame. So q has nq numbers and qd has nv. A tangent vector u is as a speed that acts for a unit of time:
-nv numbers.
+in its own frame. So q has nq numbers and qd has nv. A tangent vector u is as a speed that acts for a unit of
+time: nv numbers.
 
 For a ball the position after a tangent is p o exp(u / 2), o being the product of quaternions. Along a motion
 that starts at p, u changes by ud = dexp^-1(u) omega (Hairer, Lubich, Wanner, Geometric Numerical Integration,

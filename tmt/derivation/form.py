@@ -29,8 +29,8 @@ class Implicit(NamedTuple):
 class Form:
     """Mbar and h, and Mbar qdd + h, as sums in one order.
 
-    rates: of the latter, None: by dual numbers. by_bodies: accelerations without Mbar, where all that a method
-    takes implicitly acts at single joints. solve_any: of a system that is not symmetric.
+    rates: of the latter, None: by dual numbers. by_bodies: accelerations without Mbar, where all that a
+    method takes implicitly acts at single joints. solve_any: of a system that is not symmetric.
     """
 
     terms: Callable[..., tuple[Rows, Values]]

@@ -14,8 +14,9 @@ from .vectors import IDENTITY, ZERO, Rows, Scalars, Vector, outer, total
 def coriolis_matrix(tree: Mechanism, qd: Scalars, M: Sequence[Scalars], rates: Sequence[Scalars]) -> Rows:
     """C (nv rows of nv, N m s/rad) of Christoffel symbols, from M = Mbar and rates = dh/dqd.
 
-    C = (dh/dqd + Mbar A) / 2, where A u is the bracket of the speeds qd and u: omega x u of a ball, whose speeds are
-    about axes that turn with it, and 0 of hinges and slides. So C qd is the velocity part of h and Mbard - 2 C is skew.
+    C = (dh/dqd + Mbar A) / 2, where A u is the bracket of the speeds qd and u: omega x u of a ball, whose
+    speeds are about axes that turn with it, and 0 of hinges and slides. So C qd is the velocity part of h and
+    Mbard - 2 C is skew.
     """
     C = [[0.5 * x for x in row] for row in rates]
     of_bodies = with_diagonal(M, [x * -1.0 for x in tree.armature])  # rotors do not turn with a ball
@@ -54,9 +55,9 @@ def centroidal_momentum(parts: Sequence[Body]) -> Rows:
 def regressor(tree: Mechanism, q: Scalars, qd: Scalars, qdd: Scalars) -> Rows:
     """Y (nv rows of 10 m): Y theta is the part of Mbar qdd + h that the bodies have, without the armature.
 
-    theta: of each body its mass m, first moment s and inertia J about the origin of its joint's frame, in its axes.
-    Force and moment about that origin, which accelerates by a, gravity as an acceleration of the world, are
-    f = m a + omegad x s + omega x (omega x s) and n = s x a + J omegad + omega x J omega.
+    theta: of each body its mass m, first moment s and inertia J about the origin of its joint's frame, in its
+    axes. Force and moment about that origin, which accelerates by a, gravity as an acceleration of the world,
+    are f = m a + omegad x s + omega x (omega x s) and n = s x a + J omegad + omega x J omega.
     """
     frames = joint_frames(tree, q, qd, qdd)
     units = IDENTITY.rows

@@ -30,8 +30,9 @@ class Parameters:
     """The arguments that stand for chosen numbers of a Tree.
 
     words: "gravity"; a body, or BODY.mass, BODY.com, BODY.inertia; "payload" and a body: what that carries
-    besides. They are in the frame that is the site of the body's name on its joint, else in that of its joint.
-    values: by the names of the arguments, those of the Tree. meanings: of each. ValueError for another word.
+    besides. They are in the frame that is the site of the body's name on its joint, else in that of its
+    joint. values: by the names of the arguments, those of the Tree. meanings: of each. ValueError for another
+    word.
     """
 
     def __init__(self, tree: Tree, words: Sequence[str]):

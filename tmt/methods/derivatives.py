@@ -48,7 +48,8 @@ class Linearized(Form):
     def __init__(self, form: Form = COMPOSITE):
         super().__init__(**vars(form))
         self.last: Change  # of the state that was met last
-        # dual numbers of traced scalars meet the same states once for each direction; i: of a scalar on the tape
+        # dual numbers of traced scalars meet the same states once for each direction; i: of a scalar on the
+        # tape
         self.changes: dict[tuple[int, ...], Change] = {}
 
     def acceleration(

@@ -23,12 +23,12 @@ class SemiImplicitEuler(Method):
 
         (Mbar + dt D [+ dt dh/dqd] [+ dt S] [+ dt^2 (k + P)]) a = Qbar [- dt (k + P) qd].
 
-    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of `isolated_bodies`,
-    which have no other body on them or under them; `implicit_gains`: so is a controller's S, in the entries
-    whose two joints lie on one path to the world; `implicit_springs`: so are springs, and all entries of S
-    and P. What MuJoCo calls Euler (none of these), implicit (bias, gains), implicitfast (lone bodies, gains)
-    and discrete (lone bodies, springs, gains). MuJoCo documentation, numerical integration; which gains are
-    implicit was measured.
+    Joint damping is implicit in the speeds, and so is the bias if `implicit_bias`, or that of
+    `isolated_bodies`, which have no other body on them or under them; `implicit_gains`: so is a controller's
+    S, in the entries whose two joints lie on one path to the world; `implicit_springs`: so are springs, and
+    all entries of S and P. What MuJoCo calls Euler (none of these), implicit (bias, gains), implicitfast
+    (lone bodies, gains) and discrete (lone bodies, springs, gains). MuJoCo documentation, numerical
+    integration; which gains are implicit was measured.
     """
 
     implicit_bias: bool

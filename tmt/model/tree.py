@@ -31,11 +31,11 @@ NAMES_SHOWN = 60  # characters
 class Tree(Mechanism):
     """A tree of n joints and m rigid bodies; at the reference of all joints the frames are parallel to the inertial one.
 
-    A joint is a hinge, a slide or a ball; a free joint is three slides and a ball. Each has a frame that moves
-    with it, with its origin on the axis of a hinge, at the centre of a ball. Several joints in one body are
-    joints in a row with no body between them. There are nv speeds, one of a hinge or slide and three of a ball,
-    and nq numbers in a position. All fields are nested tuples, made of arrays and lists; those from `kind` on
-    may be left out, as (). ValueError if the numbers cannot be a tree or a rigid body.
+    A joint is a hinge, a slide or a ball; a free joint is three slides and a ball. Each has a frame that
+    moves with it, with its origin on the axis of a hinge, at the centre of a ball. Several joints in one body
+    are joints in a row with no body between them. There are nv speeds, one of a hinge or slide and three of a
+    ball, and nq numbers in a position. All fields are nested tuples, made of arrays and lists; those from
+    `kind` on may be left out, as (). ValueError if the numbers cannot be a tree or a rigid body.
 
     Parameters
     ----------

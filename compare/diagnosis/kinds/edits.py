@@ -1,6 +1,7 @@
 """Numbers of a model exchanged, negated, left out or in another unit: several that one slip changes together.
 
-Each kind is a function in KINDS. It yields edits: the place, what it explains, and the Tree's fields that differ.
+Each kind is a function in KINDS. It yields edits: the place, what it explains, and the Tree's fields that
+differ.
 """
 
 from collections.abc import Callable, Iterator

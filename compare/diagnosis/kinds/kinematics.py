@@ -1,7 +1,7 @@
 """Slips in positions, angular velocities and tensors, and what becomes of them in M and h.
 
-The position of a body's CoM is a sum of segments: offsets, slides, the CoM in its body. With J, the Jacobian of
-that sum, B, that of the angular velocity in body axes, and I the body adds
+The position of a body's CoM is a sum of segments: offsets, slides, the CoM in its body. With J, the Jacobian
+of that sum, B, that of the angular velocity in body axes, and I the body adds
 
     M = m J'J + B'IB,   gravity = -m J'g.
 
@@ -11,7 +11,8 @@ A slip changes J, B or I of one body. Into the velocity terms of h it goes in on
     Newton, Euler  m J'(Jdot qd) + B'(I Bdot qd + omega x I omega) of the wrong J, B, I
     projection     m J'a + B'(I alpha + omega x I omega) with the right a, alpha and omega
 
-Derivatives are those of imaginary changes of 1e-100, exact to rounding; a slip's effect is the sum over bodies.
+Derivatives are those of imaginary changes of 1e-100, exact to rounding; a slip's effect is the sum over
+bodies.
 """
 
 from collections.abc import Iterable

@@ -1,6 +1,7 @@
 """Numbers of the model and of forces that can be wrong.
 
-A change x of one adds x times a coefficient to numbers of the tree, or x times a column to entries of Mbar or h.
+A change x of one adds x times a coefficient to numbers of the tree, or x times a column to entries of Mbar or
+h.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,8 +1,8 @@
 """Mbar and h by the recursion of Newton and Euler with one slip: motion outward, forces and moments inward.
 
-A slip is a record in SLIPS: the step that it changes, its place, what is wrong there, where it is made. A step's
-wrong values are where `Recursion.step` or `signed` is called with its name. Mbar are the forces of unit accelerations, h
-those without acceleration. Arrays are (rows, 3), in the world's axes.
+A slip is a record in SLIPS: the step that it changes, its place, what is wrong there, where it is made. A
+step's wrong values are where `Recursion.step` or `signed` is called with its name. Mbar are the forces of
+unit accelerations, h those without acceleration. Arrays are (rows, 3), in the world's axes.
 """
 
 from collections.abc import Iterator

@@ -1,8 +1,8 @@
 """Actuators, measured: their forces at states near a posture give the law that they have there.
 
-MuJoCo's own forces are taken at four states: at the posture, at moved positions, at other speeds, and at both,
-where a law that is affine in length and speed must give the same. It is the law of the file without limits of
-controls, activations and forces.
+MuJoCo's own forces are taken at four states: at the posture, at moved positions, at other speeds, and at
+both, where a law that is affine in length and speed must give the same. It is the law of the file without
+limits of controls, activations and forces.
 """
 
 from collections.abc import Mapping

@@ -101,7 +101,8 @@ def state_inertial(body: mujoco.MjsBody, mass: float, com: np.ndarray) -> None:
 class Program(NamedTuple):
     """A controller outside of MuJoCo: the model that it drives, and the law by which it computes controls.
 
-    places: of its controls; outputs: of the lengths l and speeds that it reads; each control is u - kp l - kv ldot; all (n,).
+    places: of its controls; outputs: of the lengths l and speeds that it reads; each control is u - kp l - kv
+    ldot; all (n,).
     """
 
     model: mujoco.MjModel
@@ -123,9 +124,10 @@ def program(
 ) -> Program | None:  # fmt: skip
     """The servos of a model, or its motors, in a program; None: it has none of them.
 
-    Without gains it is the servos: motors of gain 1 take their places, whose force the program computes by the
-    servos' own law at their controls, (nu,). With kp or kv (of which the other one is 0) it is the motors, whose
-    law stays as it is: their control is kp (target - length) - kv speed. lengths: the targets, of each output.
+    Without gains it is the servos: motors of gain 1 take their places, whose force the program computes by
+    the servos' own law at their controls, (nu,). With kp or kv (of which the other one is 0) it is the
+    motors, whose law stays as it is: their control is kp (target - length) - kv speed. lengths: the targets,
+    of each output.
     """
     copy, given, rows = mujoco.MjModel.__copy__(model), kp is not None or kv is not None, []
     for i in range(number_of_actuators(model)):

@@ -80,9 +80,10 @@ class Mujoco(Engine):
     def plain(self, case: Case | None) -> dict[str, Any]:
         """How MuJoCo alone reads the file as it is, and evaluates the states of a case, if there is one; as JSON has it.
 
-        why: why it does not read this file. least: a mass for links without one, which it refuses; None: there are none.
-        qpos: positions, with the places of the case's joints in them; dofs: those of their speeds. zero: fields of the model
-        to be set to zero, where all that a Tree does not have is switched off, else None.
+        why: why it does not read this file. least: a mass for links without one, which it refuses; None:
+        there are none. qpos: positions, with the places of the case's joints in them; dofs: those of their
+        speeds. zero: fields of the model to be set to zero, where all that a Tree does not have is switched
+        off, else None.
         """
         m, source = self.source.model, self.source
         is_packed = "package://" in source.text

@@ -143,7 +143,8 @@ def contact_pairs(m: mujoco.MjModel) -> np.ndarray:
 def light_joints(m: mujoco.MjModel) -> dict[str, tuple[float, float, float]]:
     """Joints that turn less inertia at qpos0 than a ball of the densest element with the mass that they carry.
 
-    By name: the inertia, kg m2, the mass, kg, and the inertia of the ball. No body has so little: a placeholder.
+    By name: the inertia, kg m2, the mass, kg, and the inertia of the ball. No body has so little: a
+    placeholder.
     """
     found = {}
     for dof in np.flatnonzero([kind_of(m, joint) in ("hinge", "ball") for joint in m.dof_jntid]).tolist():

@@ -121,8 +121,8 @@ class Stepper:
     def watch(self, state: Array, steps: int, controls: Array | None = None) -> Iterator[mujoco.MjData]:
         """The data after each step of a run from a state, (n,), until MuJoCo finds a bad number.
 
-        controls: at each step, (steps, nu); None: those of the state, which may be changed on the way. Derived
-        fields (contacts, forces, accelerations) are of the state before the step.
+        controls: at each step, (steps, nu); None: those of the state, which may be changed on the way.
+        Derived fields (contacts, forces, accelerations) are of the state before the step.
         """
         self.put(state)
         for step in range(steps):

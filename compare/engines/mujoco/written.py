@@ -64,8 +64,8 @@ def write(stated: mujoco.MjSpec, path: Path, comment: str) -> None:
 def with_all_digits(text: str, spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
     """MuJoCo's text of a spec, each number of which is the one of the model that has these six digits.
 
-    It is that of the attribute's field, else of the element with this name, else of all; where several have the six
-    digits it stays.
+    It is that of the attribute's field, else of the element with this name, else of all; where several have
+    the six digits it stays.
     """
     fields, body = numbers_of(spec, model), ""
 

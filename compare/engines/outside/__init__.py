@@ -1,15 +1,18 @@
 """Engines that read the robot's file themselves, each in a process of its own.
 
-Their modules have, beside the record with `reads_file`, two names; they import their package in functions only:
+Their modules have, beside the record with `reads_file`, two names; they import their package in functions
+only:
 
-    METHODS = {name: (order, scheme), ...}      of integration; scheme: that of tmt, or a name of its own; order None: it takes a
+    METHODS = {name: (order, scheme), ...}      of integration; scheme: that of tmt, or a name of its own;
+    order None: it takes a
                                                 tolerance and chooses its own steps
     class Model(model.ReadModel)                what the engine has made of a file
 
-and, where they differ with the Tree, methods_for(tree), of the same form as METHODS; where the engine steps MuJoCo's own model,
-class Stepper(as_it_runs.Stepper), which runs the file as it is.
+and, where they differ with the Tree, methods_for(tree), of the same form as METHODS; where the engine steps
+MuJoCo's own model, class Stepper(as_it_runs.Stepper), which runs the file as it is.
 
-A process of its own keeps an engine's threads, its precision and a crash away from the program and from other engines.
+A process of its own keeps an engine's threads, its precision and a crash away from the program and from other
+engines.
 """
 
 from collections.abc import Callable, Mapping

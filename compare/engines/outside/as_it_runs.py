@@ -1,7 +1,8 @@
 """The file as it runs, with contacts, friction, actuators and the solver's own settings, beside MuJoCo.
 
-In the engine's own process. Free runs say how far apart the positions are after some of the file's own steps. Steps from
-MuJoCo's own states, one at a time, say which field differs first: a free run would blame chaos on one.
+In the engine's own process. Free runs say how far apart the positions are after some of the file's own steps.
+Steps from MuJoCo's own states, one at a time, say which field differs first: a free run would blame chaos on
+one.
 """
 
 import time
@@ -145,8 +146,9 @@ def compared(
 ) -> tuple[Difference | None, dict[str, float], float]:
     """first, largest and over of a Run. made: of steps the fields of MuJoCo, from a moved state, and of the engine.
 
-    A field may differ by `beyond` of its largest entry, and by FACTOR times what the rounding of the state makes of it: the
-    distance of a contact is a small difference of positions, and a force at rest follows from that.
+    A field may differ by `beyond` of its largest entry, and by FACTOR times what the rounding of the state
+    makes of it: the distance of a contact is a small difference of positions, and a force at rest follows
+    from that.
     """
     names, over, first, largest = names_of(model), 0.0, None, dict[str, float]()
     # of Runge and Kutta's stages MuJoCo leaves the mean in qacc, others the last: "qvel after" says the same

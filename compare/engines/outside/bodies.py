@@ -53,7 +53,8 @@ class Link(NamedTuple):
 def numbers_of(tree: tmt.Tree) -> dict[str, Array]:
     """The Tree's numbers, in the shapes of ReadModel.numbers; and
 
-    reference, moved: (nq,) the positions of body_numbers; rest: (nq,) of springs; levers: (bodies,) mass x com^2, kg m2.
+    reference, moved: (nq,) the positions of body_numbers; rest: (nq,) of springs; levers: (bodies,) mass x
+    com^2, kg m2.
     """
     coordinates = Coordinates(tree.joint_names, tree.kind)
     postures = np.array(tree.zero), coordinates.random(np.random.default_rng(SEED), 1)[0]
@@ -82,10 +83,11 @@ def body_numbers(
 ) -> dict[str, Array]:
     """Numbers of bodies and joints, in the world, by what links do; links_at: positions (nq,) -> the links there.
 
-    mass (joints,) kg, com (joints, 3) m and inertia (joints, 3, 3) kg m2 about it, at the positions `reference`: of all bodies
-    together that move with a joint and not with the next one; 0 if there is none. com_moved: com at the positions `moved`. axis
-    (joints, 3): of a hinge or slide at `reference`, by what a movement of 1 rad or 1 m does to the first link that moves; anchor
-    (joints, 3) m: of a hinge, the point of its axis that is nearest to the world's origin; both 0 of a ball.
+    mass (joints,) kg, com (joints, 3) m and inertia (joints, 3, 3) kg m2 about it, at the positions
+    `reference`: of all bodies together that move with a joint and not with the next one; 0 if there is none.
+    com_moved: com at the positions `moved`. axis (joints, 3): of a hinge or slide at `reference`, by what a
+    movement of 1 rad or 1 m does to the first link that moves; anchor (joints, 3) m: of a hinge, the point of
+    its axis that is nearest to the world's origin; both 0 of a ball.
     """
     before, joints = links_at(reference), coordinates.places.joints
 
@@ -128,7 +130,8 @@ def combined(parts: Sequence[Body]) -> Body:
 def size_of(stated: Numbers, number: str) -> float:
     """The size of what is added where an engine reads a number: it may keep inertias about the origin of a link.
 
-    Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may round.
+    Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may
+    round.
     """
     largest = {name: float(np.abs(values).max(initial=0.0)) for name, values in stated.items()}
     if number == "inertia":

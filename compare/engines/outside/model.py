@@ -29,13 +29,14 @@ class Reading(NamedTuple):
 class ReadModel(ABC):
     """What an engine has made of a file, in the engine's own coordinates; `order` leads from those of the Tree to them.
 
-    Units: rad, m, N m, N. No contacts, limits, actuators or friction losses act. A model sets `file`, `order` and `used`.
+    Units: rad, m, N m, N. No contacts, limits, actuators or friction losses act. A model sets `file`, `order`
+    and `used`.
     """
 
     file: File
     order: Order
-    # gravity (3,) m/s2; armature, damping, stiffness (nv,) in the Tree's order: what it has read, then what is set. One that is
-    # missing is not in its equations; then it acts as part of the torque.
+    # gravity (3,) m/s2; armature, damping, stiffness (nv,) in the Tree's order: what it has read, then what
+    # is set. One that is missing is not in its equations; then it acts as part of the torque.
     used: dict[str, Array]
     stated: Numbers  # numbers_stated of the Tree that is compared
 
@@ -59,9 +60,9 @@ class ReadModel(ABC):
     def dynamics(self, at: State, force: Array) -> tuple[Array, Array, Array]:
         """M, h and a at a state, of its own equations.
 
-        M (nv, nv) with the armature; h (nv,), the force of Coriolis, centrifugal and gravity terms for an acceleration
-        that is 0 in the Tree, h + M c; a (nv,) from M a = force - h by its forward dynamics: the force, (nv,), has
-        damping and springs.
+        M (nv, nv) with the armature; h (nv,), the force of Coriolis, centrifugal and gravity terms for an
+        acceleration that is 0 in the Tree, h + M c; a (nv,) from M a = force - h by its forward dynamics: the
+        force, (nv,), has damping and springs.
         """
 
     def prepare(self, course: Course) -> None:

@@ -1,7 +1,8 @@
 """Coordinates of an engine beside those of the Tree: where joints begin, how rotations are stated, the axes of speeds.
 
-Of the Tree: quaternions w x y z; of a free joint the velocity of the body's origin in the world and the angular velocity in body
-axes. With S and c of a state, the engine's speeds are S v, its accelerations S a + c.
+Of the Tree: quaternions w x y z; of a free joint the velocity of the body's origin in the world and the
+angular velocity in body axes. With S and c of a state, the engine's speeds are S v, its accelerations S a +
+c.
 """
 
 from collections.abc import Callable, Mapping

@@ -74,9 +74,9 @@ class Standing:
 def errors_of(values: Sequence[Array], halved: Sequence[Array], nv: int) -> tuple[list[float], Array | None]:
     """The errors of derivatives by neighbouring eps, and the truth: what agrees over the widest range of them.
 
-    values, halved: with each eps and half of it. Richardson's extrapolation takes the term in eps^2 away; what is
-    then the same for FEWEST neighbours is true, where they agree best. An error is that from both of these, as one
-    is made of the same values. inf for all, and None: nothing agrees.
+    values, halved: with each eps and half of it. Richardson's extrapolation takes the term in eps^2 away;
+    what is then the same for FEWEST neighbours is true, where they agree best. An error is that from both of
+    these, as one is made of the same values. inf for all, and None: nothing agrees.
     """
     finer = [half + (half - value) / 3.0 for value, half in zip(values, halved)]
     apart = [worst_block(one - other, one, nv)[0] for one, other in pairwise(finer)]
@@ -92,8 +92,8 @@ def errors_of(values: Sequence[Array], halved: Sequence[Array], nv: int) -> tupl
 def not_moved(values: Array, truth: Array, units: Array) -> Array:
     """The directions that no control moves and that do not decay: left vectors w, (k, n), w' A = l w', w' B = 0.
 
-    Those that stay, at l = 1, then those that grow. units: of the state, speeds in units of a step, (n,). A singular
-    value of [A - l, B] that is no larger than the norm of the error of values may be zero (Weyl).
+    Those that stay, at l = 1, then those that grow. units: of the state, speeds in units of a step, (n,). A
+    singular value of [A - l, B] that is no larger than the norm of the error of values may be zero (Weyl).
     """
     n, by_input = len(values), units[:, None] * values[:, len(values) :]
     A, B = (

@@ -68,8 +68,9 @@ def best_of(way: str, errors: Mapping[float, float | None]) -> WayRow:
 def worst_block(difference: Array, exact: Array, nv: int, least: Array | float = 0) -> tuple[float, str]:
     """The largest difference over the largest entry of its block, and that block, as dq/du.
 
-    Of [A B], (..., n, n + k), with nv movements and speeds, then activations. Blocks whose entries are no larger
-    than `least`, of each entry, are zero except for rounding, and left out. inf: a difference is not a number.
+    Of [A B], (..., n, n + k), with nv movements and speeds, then activations. Blocks whose entries are no
+    larger than `least`, of each entry, are zero except for rounding, and left out. inf: a difference is not a
+    number.
     """
     least, worst, n = np.broadcast_to(least, exact.shape), (0.0, ""), exact.shape[-2]
     to = {"dq": slice(nv), "dv": slice(nv, 2 * nv), "da": slice(2 * nv, n)}
@@ -85,8 +86,8 @@ def worst_block(difference: Array, exact: Array, nv: int, least: Array | float =
 class Subject:
     """States along a scene, without contacts and limits: in MuJoCo by a Stepper, in tmt by a Tree.
 
-    by: the inputs u, controls where the robot's actuators act, else torques. gains: of each state the generalized
-    force by each of them, (states, nv, k).
+    by: the inputs u, controls where the robot's actuators act, else torques. gains: of each state the
+    generalized force by each of them, (states, nv, k).
     """
 
     def __init__(self, engine: Mujoco, case: Case, dt: float, integrator: str, states: int) -> None:
@@ -158,7 +159,8 @@ class Subject:
     def share_of_differences(self, values: Mapping[float, Array]) -> float:
         """The largest share, over eps and entries, of what rounding and truncation can do to centred differences.
 
-        Rounding: that of a step over the eps. Truncation: twice the term in eps^2, from ten and a hundred times eps.
+        Rounding: that of a step over the eps. Truncation: twice the term in eps^2, from ten and a hundred
+        times eps.
         """
         A, shares = self.exact[:, :, : self.exact.shape[1]], []
         sizes = of_a_step(self.case.tree, self.q, self.qd, self.tau, self.dt, A)

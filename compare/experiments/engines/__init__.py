@@ -32,7 +32,8 @@ SLOW = 20.0  # s of the processor, of a run that is slow
 TABLES = "answer", "read", "runs"
 # of which nothing more is said; their names are kinds in the template
 NOT_ASKED = Unread, OtherJoints, OtherNames, TooLong
-# s, of the first calls of an engine that compiles: in all, per speed and pair of speeds; measured on two cores
+# s, of the first calls of an engine that compiles: in all, per speed and pair of speeds; measured on two
+# cores
 COMPILATION = 15.0, 1.0, 0.05
 
 
@@ -164,8 +165,8 @@ def asked_at(setup: Setup, precision: str) -> Sample:
 def add_runs(result: EnginesResult, setup: Setup, record: EngineRecord, dynamics: OutsideDynamics) -> None:
     """Rows and a check of the file as it runs in an engine that steps MuJoCo's model.
 
-    Where a field differs, it runs with more iterations too, until none does: what the solver has not converged to is not the
-    engine's error. Where compilation is slow, with the most iterations alone.
+    Where a field differs, it runs with more iterations too, until none does: what the solver has not
+    converged to is not the engine's error. Where compilation is slow, with the most iterations alone.
     """
     answer, unit, runs = result.answers[record.label], movement_unit(setup.robot.coordinates), list[Run]()
     more: list[int | None] = [None, *ITERATIONS]

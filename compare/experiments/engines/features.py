@@ -1,8 +1,8 @@
 """Why an engine has another number: MuJoCo reads the file without a feature of it, and then has the engine's number.
 
-A feature is one record: its name, and what is done to MuJoCo's specification of the file so that it is not there. All are tried
-for all engines. One is a cause of an entry if MuJoCo has the engine's number without it, with it does not, and no other entry of
-that quantity that it changes was read as MuJoCo reads it.
+A feature is one record: its name, and what is done to MuJoCo's specification of the file so that it is not
+there. All are tried for all engines. One is a cause of an entry if MuJoCo has the engine's number without it,
+with it does not, and no other entry of that quantity that it changes was read as MuJoCo reads it.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence

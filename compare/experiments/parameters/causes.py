@@ -11,8 +11,8 @@ from ...core.text import say
 from .numbers import OF_BODIES, Compared
 
 SAME = 1e-9  # relative: a factor, or a change, that is the same at several places
-# of the largest of a vector: mj_saveLastXML writes six digits, which moves a number by half a unit of its sixth digit,
-# 5e-6 at most, and one that is turned by a quaternion twice as much
+# of the largest of a vector: mj_saveLastXML writes six digits, which moves a number by half a unit of its
+# sixth digit, 5e-6 at most, and one that is turned by a quaternion twice as much
 SIX_DIGITS = 1e-5
 ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("anchor", "com"))  # quantities with a common factor
 OF_JOINTS = "anchor", "axis", "ref"

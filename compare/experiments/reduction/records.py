@@ -18,8 +18,9 @@ class FreeRow(Row):
 class JointRow(Row):
     """What a scene needs of a joint.
 
-    moved: from the start, rad or m. acceleration: the largest with the joint at its start and at rest, rad/s2 or
-    m/s2. error_if_locked: of the others, rad or m; None: it is not to be locked. why_needed: "" where it is not.
+    moved: from the start, rad or m. acceleration: the largest with the joint at its start and at rest, rad/s2
+    or m/s2. error_if_locked: of the others, rad or m; None: it is not to be locked. why_needed: "" where it
+    is not.
     """
 
     scene: str

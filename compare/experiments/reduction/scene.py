@@ -80,7 +80,8 @@ class Scene:
     def recipe(self, small: Smaller, file: str, error: float) -> dict[str, Any] | None:
         """How plain MuJoCo repeats the error of a file with a smaller model, rad or m; None: controls change on the way.
 
-        places: of the whole model's positions, those that the smaller one has. Each motion starts from a keyframe of its name.
+        places: of the whole model's positions, those that the smaller one has. Each motion starts from a
+        keyframe of its name.
         """
         if self.points or any(roll.controls is not None for roll in self.rolls):
             return None

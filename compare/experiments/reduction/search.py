@@ -54,8 +54,8 @@ class Locks(NamedTuple):
 def lockable(scene: Scene, allowed: float) -> Locks:
     """Lock joints of what is left, those of least error first, until an error, rad or m, of those that stay.
 
-    Those that a tendon or an equality ties are locked together, each at the middle of its movement. One that moves
-    more than DOES is not locked, nor is a free base.
+    Those that a tendon or an equality ties are locked together, each at the middle of its movement. One that
+    moves more than DOES is not locked, nor is a free base.
     """
     use, model, costs = scene.use, scene.left.model, dict[tuple[str, ...], float]()
     kinds = {name: kind_of(model, number) for number, name in enumerate(joints(model))}

@@ -169,7 +169,8 @@ def measure(
 def floor(case: Case, dynamics: Dynamics) -> float:
     """The error of the angles that rounding leaves, rad: eps times the largest growth of a small difference.
 
-    dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; NoReference if the run diverges.
+    dynamics: tmt's, run by RK4 with 1024 steps or as many as the scene needs; NoReference if the run
+    diverges.
     """
     recorded = GROWTH_STEPS * GRID
     first = recorded * max(1, round(case.duration / 5.0), -(-coarsest_steps(case) // recorded))

@@ -19,11 +19,11 @@ EXPONENTS = {  # k of the coarsest and of the finest tolerance, 10^-k
 FEW_SETTINGS = {"quick": 5, "small": 7}  # of a run that is not full: the coarsest settings
 FEW_OTHERS = 2  # the same for engines other than MuJoCo and tmt
 LEAST_SETTINGS = {"full": 3, "quick": 2, "small": 2}  # of a method, whatever they take
-# seconds of the finest run of a method; of a method whose coarsest run takes longer there is none; and after which
-# a method of a called engine has no finer run
+# seconds of the finest run of a method; of a method whose coarsest run takes longer there is none; and after
+# which a method of a called engine has no finer run
 MOST_SECONDS, SLOWEST_RUN, LONGEST_CALLED = {"full": 0.15, "quick": 0.1, "small": 0.1}, 0.6, 0.06
-# A robot may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5; an engine
-# that is called from Python adds those of a call and of the solver's own work:
+# A robot may have any number of joints. Seconds of one evaluation are about a constant times nv^1.5; an
+# engine that is called from Python adds those of a call and of the solver's own work:
 SECONDS, CALL_SECONDS = {"mujoco": 2e-7, "tmt": 5e-8}, 3e-5
 ITERATIONS = 3  # of Newton's method for the stages of an implicit step, about
 QUICK_SPEEDS = 4  # nv up to which a quick run has methods that solve their stages

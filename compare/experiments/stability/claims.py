@@ -1,6 +1,7 @@
 """The three claims of the assignment about the arm that is held by a constant torque and integrated by RK4.
 
-1: it leaves a posture because of rounding. 2: with a finer step it leaves to the other side. 3: it stays at another posture.
+1: it leaves a posture because of rounding. 2: with a finer step it leaves to the other side. 3: it stays at
+another posture.
 """
 
 from collections.abc import Mapping, Sequence

@@ -27,9 +27,10 @@ def predicted(
 ) -> np.ndarray:
     """When each method's own linear map has a joint 0.1 rad away, (methods, k) s; NaN: not within 12 s.
 
-    moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (methods, k, n) N m.
-    The map carries all modes of the state about the equilibrium that this torque moves. Each new angle is rounded to a
-    double, as in a run, so that what a step adds may be lost; the rates are too small for that to matter.
+    moved: angles at the start from the posture, (k, n) rad; off: torques beyond the one that holds, (methods,
+    k, n) N m. The map carries all modes of the state about the equilibrium that this torque moves. Each new
+    angle is rounded to a double, as in a run, so that what a step adds may be lost; the rates are too small
+    for that to matter.
     """
     n = at.nv
     changes = np.array([(at.step(scheme, dt) - np.eye(2 * n)).T for scheme in schemes])
@@ -50,8 +51,8 @@ def predicted(
 def is_led(at: Equilibrium, scheme: str, dt: float) -> bool:
     """Whether a method's step lets no mode grow faster than the one along which a saddle is left.
 
-    If it does, that mode outgrows the other from what rounding and squares of the deviation put into it, and the linear map
-    cannot say when the posture is left.
+    If it does, that mode outgrows the other from what rounding and squares of the deviation put into it, and
+    the linear map cannot say when the posture is left.
     """
     return bool(np.isclose(at.growing_rate(scheme, dt), np.abs(at.rates[0]), rtol=NEGLIGIBLE))
 
@@ -119,8 +120,9 @@ def departure_values(rows: list[DepartureRow]) -> dict[str, Any]:
 def own_torque(method: Method, engines: Mapping[str, Engine], at: Equilibrium) -> np.ndarray:
     """The torque under which the compiled arithmetic of an engine gives no acceleration at all at the posture, (n,) N m.
 
-    MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the one whose
-    residual is least; compiled code regroups the sums, and there may be no double that it takes for its bias.
+    MuJoCo's is its own bias. TMT's is sought among the torques within two ulps of its reference torque: the
+    one whose residual is least; compiled code regroups the sums, and there may be no double that it takes for
+    its bias.
     """
     if method.engine == "mujoco":
         return engines["mujoco"].of(at.case).bias(at.q, np.zeros(at.nv))

@@ -18,7 +18,8 @@ GROWTH_ALLOWED = 100.0  # fold, of the deviation
 FAR = 1e4  # growth beyond which a motion is not linear any more
 GROWTH_MARGIN = 1e-3  # relative: from the second to the last quarter of a run; less is no growth
 DECAYED = 1e-3  # of its share at the start: a mode below that has decayed, and rounding and its square are what is left
-# times the predicted limit; if there is none, the time in which the fastest mode moves: the observed one is sought among them
+# times the predicted limit; if there is none, the time in which the fastest mode moves: the observed one is
+# sought among them
 TRIED_ABOUT, TRIED_OF_FASTEST = np.array([0.5, 0.9997, 1.0003, 2.0]), np.array([0.1, 0.1, 1.0, 10.0])
 BISECTED = 1e-4  # relative, to which it is then bisected
 LIMIT_TOLERANCE = 1e-3  # relative, of an observed limit to the predicted one
@@ -83,9 +84,10 @@ def shares(
 ) -> list[np.ndarray]:
     """Shares of the modes in the deviation, over those at the start, in the second and the last quarter of a run, (2n,).
 
-    All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of motion, not of
-    a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that swings in it cancel. Of modes
-    that decay those that move within a quarter are seen: squares of the fast ones move what the slow ones swing about.
+    All modes start alike, each with an angle of up to 1e-6 rad. The modes are those of the equations of
+    motion, not of a method; a quarter holds a swing of the slowest. Its mean is weighted (Hann), so that
+    swings in it cancel. Of modes that decay those that move within a quarter are seen: squares of the fast
+    ones move what the slow ones swing about.
     """
     n, quarter = at.nv, quarter_of(at, dt, steps)
     start = LINEAR_DEVIATION * at.shapes.sum(axis=1).real / (2 * n)

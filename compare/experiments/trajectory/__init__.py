@@ -25,8 +25,8 @@ SHOWN = ["scene", "engine_integrator", "dt_s", "level", "largest_difference", "u
 skipped = leaves_no_digits
 
 
-# what begin starts: of each scene the comparison; the scenes whose true motion is computed, with it; and the scenes
-# that are left out, with the seconds that they would take, None: there is no method
+# what begin starts: of each scene the comparison; the scenes whose true motion is computed, with it; and the
+# scenes that are left out, with the seconds that they would take, None: there is no method
 Work = tuple[Iterable[TrajectoryResult], Iterable[tuple[str, Reference]], Mapping[str, float | None]]
 
 
