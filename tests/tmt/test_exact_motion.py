@@ -54,6 +54,13 @@ def short_run(tree, q, qd, tau, duration) -> list:
         return mpmath.odefun(rates, 0, [*of_length_1(tree.coordinates, q), *qd])(duration)
 
 
+def test_times_are_exact_multiples_of_what_the_double_is():
+    """A disc that nothing turns: 3 rad/s, after 1, 2, 3 times 0.1 s, of which no double is the third."""
+    path = trajectory(one_body([(0.0, 0.0, 1.0)], gravity=(0.0, 0.0, 0.0)), [0.0], [3.0], [0.0], 0.1, 3)
+    for k, (high, low) in enumerate(zip(path.high[:, 0], path.low[:, 0])):
+        assert abs(Fraction(high) + Fraction(low) - 3 * k * Fraction(0.1)) < Fraction(1, 10**30)
+
+
 @pytest.mark.parametrize("form", reference_run.FORMS)
 @pytest.mark.parametrize("axis, arm", [((0, 1, 0), (0, 0, -1)), ((1, 2, 2), (2, 1, -2))])
 def test_a_pendulum_is_its_elliptic_function(axis, arm, form):

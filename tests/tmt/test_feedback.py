@@ -8,6 +8,7 @@ from helpers.trees import tree_of_kinds
 from scipy.integrate import solve_ivp
 
 import tmt
+from tmt.feedback import as_gains
 
 START, REST, GOAL = np.array([0.5, 0.3, 1.0]), np.zeros(3), np.array([0.2, 0.1, 0.8])
 KP, KD = np.diag([8.0, 9.0, 4.0]), np.array([[1.0, 0.2, 0.0], [0.0, 0.9, 0.0], [0.0, 0.0, 0.3]])
@@ -40,6 +41,13 @@ def test_a_run_is_that_of_dop853(law):
     motion = tmt.simulate(tmt.ARM, START, REST, law, dt=1 / 1024, steps=512, every=128)
     assert motion.ended is None and motion.q.shape == (5, 3) and motion.evaluations == 4 * 512
     assert np.abs(np.concatenate([motion.q[-1], motion.qd[-1]]) - expected).max() < 1e-6
+
+
+def test_a_linear_torque_is_gains_and_what_is_left_at_zero_positions():
+    tree = dataclasses.replace(tmt.ARM, reference=(0.4, -0.2, 0.7))
+    driven, constant, torque = as_gains(tree, proportional)
+    assert torque is None and np.allclose(constant, KP @ GOAL + 1.5, rtol=0.0, atol=1e-14)
+    assert np.array_equal(driven.position_gain, KP) and np.array_equal(driven.speed_gain, KD / 2.0)
 
 
 @pytest.mark.parametrize("method", ["rk4", "implicitfast", "gauss_legendre_4", "dopri8_adaptive", "taylor"])

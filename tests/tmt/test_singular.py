@@ -27,6 +27,15 @@ def test_a_step_from_a_singular_state_has_no_derivatives_and_says_why(method, q)
         tmt.step_derivatives(tree, q, Z, Z, 0.01, "rk4")
 
 
+def test_of_many_states_one_that_is_singular_but_for_rounding_is_refused():
+    q = np.tile([0.5, 0.3, 1.0], (1000, 1))
+    assert np.isfinite(tmt.acceleration(wrist(), q, 0.0 * q, 0.0 * q)).all()
+    for first, last in np.random.default_rng(2).uniform(-3.0, 3.0, (10, 2)):
+        q[700] = first, np.pi, last
+        with pytest.raises(ValueError, match=r"singular.*'a', 'c'"):
+            tmt.acceleration(wrist(), q, 0.0 * q, 0.0 * q)
+
+
 @pytest.mark.parametrize("method", IMPLICIT)
 def test_damping_that_is_implicit_makes_a_step_regular(method):
     qd, tau, dt, h = np.array([0.3, -0.2, 0.5]), np.array([0.1, 0.0, 0.2]), 0.05, 1e-6
