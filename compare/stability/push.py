@@ -235,10 +235,17 @@ class Pushed(Runs):
         def is_sure(dt: float) -> bool:
             return self.sure(trial(dt)) and self.sure(trial(max(BELOW * dt, self.fine_dt)))
 
+        def failed() -> list[float]:
+            return sorted(
+                one.dt for one, found in self.tried.items() if one == trial(one.dt) and not found.holds
+            )
+
         ends = self.fine_dt, self.longest, WITHIN
         low, high = largest(lambda dt: self.verdict(trial(dt)).holds, self.dt, *ends)
         if surely and low is not None and not is_sure(low):
             lower, higher = largest(is_sure, low, self.fine_dt, low, WITHIN)
+            while lower is not None and failed()[0] < lower:  # where it is chance, on the way
+                lower, higher = largest(is_sure, failed()[0], self.fine_dt, failed()[0], WITHIN)
             is_own = (lower or 0.0) < self.dt <= low and self.sure(trial(self.dt))
             low, high = (self.dt, high) if is_own else (lower, higher)
         failing = high or 0.0
@@ -247,6 +254,8 @@ class Pushed(Runs):
                 high = failing
                 break
             failing *= ABOVE
+        else:
+            high = next((dt for dt in failed() if dt > (low or 0.0)), high)
         return Limit(low, high, self.verdict(trial(high)).dof if high else None)
 
     def recipe(self, dt: float, integrator: str) -> dict[str, Any] | None:

@@ -22,6 +22,7 @@ from helpers.pushed_models import (
 
 import compare
 from compare.stability.answer import StepLimitRow
+from compare.stability.push import Pushed, Verdict
 
 SERVO_WITHOUT_KV = '<position joint="turn" kp="400"/>'
 
@@ -202,3 +203,32 @@ def test_a_push_that_topples_at_fine_steps_is_no_fault_of_the_step():
     assert all(end_speed(LEDGE, 0.01, "Euler", 0.1, signs=(sign, 1.0, -sign)) < 0.01 for sign in (1.0, -1.0))
     row = euler(LEDGE)
     assert row.judged_by == "rest" and row.stable_at_file_dt and row.stable_up_to_s > 0.01
+
+
+class ByChance(Pushed):
+    """Steps near 48 ms and above 52 ms fail after a further push, above 60 ms after the first ones, nowhere after most."""
+
+    def __init__(self):
+        self.dt, self.fine_dt, self.longest, self.tried, self.surely = 0.005, 5e-4, 0.2, {}, set()
+
+    def told(self, trial, fails):
+        return self.tried.setdefault(trial, Verdict("diverges" if fails else "", 0, 0, 0.0, 0.0, None))
+
+    def verdict(self, trial):
+        return self.told(trial, trial.dt > 0.06)
+
+    def sure(self, trial):
+        if self.verdict(trial).holds and (0.0475 < trial.dt < 0.0484 or trial.dt > 0.052):
+            del self.tried[trial]
+            self.told(trial, fails=True)
+        return self.tried[trial].holds
+
+    def mostly_fails(self, trial):
+        return False
+
+
+def test_no_step_up_to_the_limit_was_seen_to_fail_and_the_one_that_fails_was():
+    pushed = ByChance()
+    limit = pushed.limit(0.1, "Euler")
+    failed = [trial.dt for trial, verdict in pushed.tried.items() if not verdict.holds]
+    assert any(dt < 0.05 for dt in failed) and 0.04 < limit.stable_up_to < limit.fails_at == min(failed)
