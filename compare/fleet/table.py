@@ -95,7 +95,7 @@ def judge(row: FileRow, report: Report, reference: Reference) -> None:
         names = [cause.text for cause in report.causes] or said[:1]
         said = [block("fleet", "some", reasons=names, most=3), *(said[1:2] if failed["broke"] else [])]
     matched = block("fleet", "matched", renamed=reference.renamed)
-    row.reason = "; ".join(filter(None, (*said, matched, *reference.otherwise)))
+    row.reason = "; ".join(filter(None, (*said, matched, *reference.otherwise, *reference.to_know)))
     row.worst_ratio = None if top is None else top.over_tolerance
     steps = [row for section in sections for row in section.result.tables.get("step_limits", ())]
     row.stable_at_file_dt, row.limit = worst_step(steps)

@@ -4,7 +4,7 @@
   signs.
 - The fine run without a push shows whether the robot rests: slower than STILL in its last quarter. Still, after a
   push, is no faster than that and half of the push (STILLER to STILL).
-- Truth is the same run at fine steps, by the file's integrator or by Euler's, whichever first rests after the
+- Truth is the same run at fine steps, by the file's integrator, by Euler's or by implicitfast, whichever first rests after the
   usual push. A fine run that is not finite is refined up to three times; if it never is, nothing is judged.
 - The usual push is 0.1 rad/s or m/s, or the largest up to which fine runs come to rest, or coast no faster than
   the push.
@@ -98,9 +98,9 @@ class Pushed(Runs):
         return survived
 
     def find_truth(self, most: float = USUAL) -> None:
-        """Find the integrator of fine runs, and the largest push that they survive: the file's or Euler's, which first rests."""
+        """Find the integrator of fine runs, which first rests, and the largest push that they survive."""
         found = {}
-        for name in dict.fromkeys((self.integrator, "Euler")):
+        for name in dict.fromkeys((self.integrator, "Euler", "implicitfast")):
             self.truth, self.fine, self.by_twice = name, {}, {}
             found[name] = self.survives_up_to(most), self.fine, self.by_twice
             if found[name][0] >= (self.asked or USUAL):

@@ -267,3 +267,10 @@ def test_a_file_with_a_body_more_on_a_joint_than_the_solution_is_refused_with_bo
     for file, solution, found, stated in ((more, less, 1, 0), (less, more, 0, 1)):
         with pytest.raises(ModelError, match=f"on joint j: {found}, in the solution {stated}"):
             engine(file, solution)
+
+
+def test_a_body_whose_joints_are_in_another_order_is_named_with_both_joints():
+    yaw, pitch = '<joint name="yaw" axis="0 0 1"/>', '<joint name="pitch" axis="0 1 0"/>'
+    text = f'<mujoco><worldbody><body name="a">{{}}{MASS}</body></worldbody></mujoco>'
+    with pytest.raises(ModelError, match="body a is on yaw, there on pitch"):
+        engine(read(text.format(pitch + yaw)), read(text.format(yaw + pitch)))

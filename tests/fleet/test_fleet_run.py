@@ -153,10 +153,13 @@ def test_all_files_are_compared_with_a_solution_and_joints_of_other_names_are_ma
     files = {"heavy.xml": right.replace("mass='1'", "mass='2'")}
     files |= {"renamed.xml": right.replace("name='j' ", "")}
     files |= {"slide.xml": right.replace("axis", "type='slide' axis"), "right.xml": right}
+    mesh = "<asset><mesh name='g' file='gone.stl'/></asset><worldbody><geom type='mesh' mesh='g'/>"
+    files |= {"mesh.xml": right.replace("<worldbody>", mesh)}
     found = fleet(files, ["parameters"], reference="solution.xml")
     named = {
         "heavy.xml": (DIFFER, "mass of b: 2 kg in heavy.xml, 1 kg in solution.xml"),
         "renamed.xml": (AGREE, "joint 0 as j"), "slide.xml": (DIFFER, "solution.xml"), "right.xml": (AGREE, ""),
+        "mesh.xml": (AGREE, "gone.stl"),
     }  # fmt: skip
     assert found.verdicts == {name: verdict for name, (verdict, _) in named.items()}
     assert all(word in found.rows[name].reason for name, (_, word) in named.items())

@@ -232,3 +232,13 @@ def test_no_step_up_to_the_limit_was_seen_to_fail_and_the_one_that_fails_was():
     limit = pushed.limit(0.1, "Euler")
     failed = [trial.dt for trial, verdict in pushed.tried.items() if not verdict.holds]
     assert any(dt < 0.05 for dt in failed) and 0.04 < limit.stable_up_to < limit.fails_at == min(failed)
+
+
+def test_fine_steps_that_shake_within_a_range_of_forces_are_not_the_truth():
+    """The limit of Euler is 2 I / kv = 0.4 ms, fine steps are of 0.5 ms; within 100 N m nothing diverges."""
+    strong = hinge(
+        f'<position joint="turn" kp="400" kv="{2.0 * INERTIA / 4e-4}" forcerange="-100 100"/>', dt=0.004
+    )
+    assert end_speed(strong, 5e-4, "Euler", 0.1) > 0.3 and end_speed(strong, 1e-4, "Euler", 0.1) < 0.01
+    row = euler(strong)
+    assert row.fine_integrator == "implicitfast" and row.judged_by == "rest" and not row.stable_at_file_dt

@@ -183,6 +183,13 @@ def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
         bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
         if len(bodies) != len(stated):
             counts = f"bodies with mass on joint {joint}: {len(bodies)}, in the solution {len(stated)}"
+            here, there = (
+                dict(zip(tree.body_names, (tree.joint_names[k] for k in tree.body_joint)))
+                for tree in (reading.tree, solution.tree)
+            )
+            moved = next((name for name in here if there.get(name, here[name]) != here[name]), "")
+            if moved:
+                counts += f"; body {moved} is on {here[moved]}, there on {there[moved]}"
             raise ModelError(f"cannot compare the bodies of {reading.source}: {counts}")
         order = stated if stated.keys() == bodies.keys() else bodies
         numbers |= zip(stated.values(), [bodies[name] for name in order])
