@@ -1,7 +1,9 @@
 """The longest stable step after a push: against closed forms, MuJoCo's derivative and plain runs with other signs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import mujoco
 import numpy as np
 import pytest
 from helpers import pushed_models as models
@@ -23,6 +25,7 @@ from helpers.pushed_models import (
 import compare
 from compare.stability.answer import StepLimitRow
 from compare.stability.push import Pushed, Verdict
+from compare.stability.runs import Runs
 
 SERVO_WITHOUT_KV = '<position joint="turn" kp="400"/>'
 
@@ -242,3 +245,16 @@ def test_fine_steps_that_shake_within_a_range_of_forces_are_not_the_truth():
     assert end_speed(strong, 5e-4, "Euler", 0.1) > 0.3 and end_speed(strong, 1e-4, "Euler", 0.1) < 0.01
     row = euler(strong)
     assert row.fine_integrator == "implicitfast" and row.judged_by == "rest" and not row.stable_at_file_dt
+
+
+@pytest.mark.parametrize("place, turn, apart", [
+    ((3.0, -2.0, 1.0), (0.0, 0.0, 2.0), 0.0), ((0.0, 0.0, 0.6), (0.0, 0.0, 0.0), 0.4),
+    ((0.0, 0.0, 1.0), (0.5, 0.0, 0.0), 0.5), ((0.0, 0.0, 1.0), (0.0, 3.0, 0.0), 3.0),
+])  # fmt: skip
+def test_what_is_free_ends_elsewhere_if_it_is_lower_or_tilted(place, turn, apart):
+    text = '<mujoco><worldbody><body pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>'
+    model, start = mujoco.MjModel.from_xml_string(text), np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    end = np.r_[place, start[3:]]
+    mujoco.mj_integratePos(model, end, np.r_[np.zeros(3), turn], 1.0)
+    run, other = (SimpleNamespace(q=q[None]) for q in (end, start))
+    assert Runs.elsewhere(SimpleNamespace(model=model), run, other) == pytest.approx(apart, abs=1e-9)

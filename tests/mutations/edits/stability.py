@@ -26,6 +26,7 @@ EDITS = (
     ("stability.push", "Pushed.failure", "run.late > GROWS * _1", "False", "weak growth is not seen"),
     ("stability.push", "Pushed.judged_by", "self.rests and _1", "_1", "a stated push is judged whatever it does"),
     ("stability.runs", "Runs.elsewhere", "np.flatnonzero(_1) if gravity else ()", "()", "what slides on its floor has fallen"),
+    ("stability.runs", "Runs.elsewhere", "max(fall, tilt)", "fall", "what tips over on its floor has not fallen"),
     ("stability.answer", "DAMPED", "0.5", "0.0", "no step damps"),
     ("stability.runs", "Runs.creep", "0.5 * before[dof]", "1e3 * before[dof]", "nothing creeps"),
     ("stability.runs", "Runs.along", "until", "0.0", "the distance from fine runs is that of the first step"),
