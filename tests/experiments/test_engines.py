@@ -13,6 +13,8 @@ import pytest
 
 from compare import experiments
 from compare.core.errors import Refused
+from compare.core.finding import Finding
+from compare.core.text import say
 from compare.engines.outside import Outside
 from compare.robots.arm import ARM
 from compare.run import examine
@@ -185,3 +187,8 @@ def test_without_another_engine_there_is_nothing_to_answer(monkeypatch):
     monkeypatch.setattr(Outside, "unavailable", lambda engine: "not installed")
     assert experiments.skipped("engines", ARM, "mujoco,drake").kind == "none_installed"
     assert experiments.skipped("engines", ARM, "mujoco,tmt").kind == "none_chosen"
+
+
+def test_an_engine_that_is_asked_for_and_not_installed_is_named_in_the_answer():
+    about = {"name": "a.xml", "verdicts": {}, "absent": {"it is not installed": ["Drake"]}, "rows": []}
+    assert "Drake not asked (it is not installed)" in say(Finding("engines", "answer", about))

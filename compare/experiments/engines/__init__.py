@@ -65,7 +65,7 @@ def rows(setup: Setup) -> EnginesResult:
     for reason, labels in absent.items():
         result.find("absent", engines=labels, reason=reason)
     verdicts = {label: is_same(answer) for label, answer in result.answers.items()}
-    values: dict[str, Any] = {"name": Path(setup.robot.mjcf).name, "verdicts": verdicts}
+    values: dict[str, Any] = {"name": Path(setup.robot.mjcf).name, "verdicts": verdicts, "absent": absent}
     values["rows"] = result.tables["engines_answer"]
     result.headline = result.finding("headline", **values)
     result.top.append(result.finding("answer", **values))
