@@ -20,7 +20,7 @@ from .pairs import SCHEMES_OF_RK4, Pair
 
 FRAMES = 64  # of a scene at most, without its start
 SCENES = 2
-SIZE, DPI = (6.4, 4.2), 100  # inches, and pixels of an inch
+SIZE, DPI = (6.4, 4.2), 80  # inches, and pixels of an inch
 MILLISECONDS, PAUSE = 80, 1200  # of a picture, and of the last one of a scene
 # of the first engine, and of MuJoCo, which is drawn over it
 LOOKS = {"linewidth": 12, "marker": "o", "markersize": 14, "color": BLUE, "solid_capstyle": "round"}, {
@@ -116,4 +116,4 @@ def drawn(pair: Pair, label: str) -> Iterator[Image.Image]:
         canvas.restore_region(background)
         for artist in (*lines, status):
             figure.draw_artist(artist)
-        yield Image.fromarray(np.asarray(canvas.buffer_rgba())).quantize(32, Image.Quantize.FASTOCTREE)
+        yield Image.fromarray(np.asarray(canvas.buffer_rgba())).quantize(16, Image.Quantize.FASTOCTREE)
