@@ -141,8 +141,8 @@ def main(sizes: list[int], out: Path) -> None:
             rows.append(costs(joints, folder))
         table = pandas.DataFrame(rows)
         table.to_csv(out / "costs.csv", index=False, float_format="%.4g")
+        draw(table, out / "costs.png")
     print(table.to_string(index=False, float_format=lambda x: f"{x:.3g}"))
-    draw(table, out / "costs.png")
 
 
 if __name__ == "__main__":
