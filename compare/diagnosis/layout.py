@@ -14,6 +14,11 @@ from ..judge.scale import EPS, FACTOR
 
 MOST_SPEEDS = 8  # with more, coefficients of products of speeds are not compared: there are nv^2 (nv + 1) / 2
 ROUNDED = FACTOR * EPS  # of the scale of an entry
+IN_PARTS = {  # how the parts in which alone a slip was made are said
+    ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
+    ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in {rest} alone",
+    ("M", "velocity terms"): ", but not in {rest}", ("M", "gravity"): ", but not in the velocity terms of h",
+}  # fmt: skip
 
 
 class Entry(NamedTuple):

@@ -25,7 +25,7 @@ from .kinds.recursion import slips_of_recursion
 from .kinds.slips import slips_of_kinematics
 from .kinds.terms import coefficients, squares_of_velocities, terms
 from .kinds.variants import lagrange, program_options
-from .layout import Values
+from .layout import IN_PARTS, Values
 from .model import Equations
 from .pairs import of_numbers, of_slips
 from .regression import several
@@ -37,11 +37,6 @@ NEAREST = 0.05  # of the difference: what leaves more is not near
 NEAR = 2  # conventions with which another cause is sought, and single changes of which the nearest is told
 PARTIAL = 0.7  # of the difference: what such a convention leaves at most
 IN_PART, CONVENTION_IN_PART = 0.12, 0.32  # costs of a slip, of a convention in some parts alone
-IN_PARTS = {  # how the parts in which alone a slip was made are said
-    ("M",): " in M alone", ("h",): " in h alone", ("velocity terms", "gravity"): " in h alone",
-    ("velocity terms",): " in the velocity terms of h alone", ("gravity",): " in {rest} alone",
-    ("M", "velocity terms"): ", but not in {rest}", ("M", "gravity"): ", but not in the velocity terms of h",
-}  # fmt: skip
 
 Kind = Callable[[Equations], Iterator[Hypothesis]]
 FACTORS: tuple[Kind, ...] = (terms, squares_of_velocities, coefficients, forces_in_bias)

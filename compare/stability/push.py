@@ -266,10 +266,8 @@ class Pushed(Runs):
         if self.motion.program or len(self.motion.times):
             return None
         trial = Trial(self.push, dt, integrator)
-        fastest, way = (
-            max(float(run.most.max()) for run in self.fine_runs(self.push)),
-            self.verdict(trial).way,
-        )
+        fastest = max(float(run.most.max()) for run in self.fine_runs(self.push))
+        way = self.verdict(trial).way
         lasts = self.lasts * (1.0 if way < WAYS else SURELY)
         run = self.run(trial, way, max(FAST, 10.0 * fastest), lasts)
         count, done, over = round(lasts / dt), len(run.speeds), 1

@@ -51,9 +51,8 @@ def test_an_error_is_that_of_the_largest_entry_of_its_block():
         difference[row, column] = 1e-8
         assert ways.worst_block(difference, exact, 2) == (pytest.approx(1e-8 / size), block)
     zero, rounding = np.where(np.abs(exact) < 1e-5, 0.0, exact), np.full_like(exact, 1e-5)
-    assert (
-        ways.worst_block(np.full_like(exact, 1e-8), exact, 2, rounding)[1] == "dv/du"
-    )  # dq/du is but rounding
+    # dq/du is but rounding
+    assert ways.worst_block(np.full_like(exact, 1e-8), exact, 2, rounding)[1] == "dv/du"
     assert ways.worst_block(np.full_like(exact, 1e-8), zero, 2)[1] == "dv/du"
     assert ways.worst_block(np.nan * exact, exact, 2)[0] == np.inf
 
