@@ -28,8 +28,8 @@ settings.register_profile("project", database=None, derandomize=True, deadline=N
 settings.load_profile("project")
 
 BUDGET = {  # s of processor time of the default run, for each folder, from an empty store
-    "agreement": 16, "diagnosis": 32, "engines": 12, "experiments": 50, "export": 12, "fleet": 8, "house": 14, "judge": 2,
-    "process": 20, "report": 12, "robots": 10, "run": 20, "stability": 30, "tmt": 40, "truth": 2,
+    "agreement": 28, "diagnosis": 28, "engines": 12, "experiments": 46, "export": 10, "fleet": 8, "house": 8, "judge": 2,
+    "process": 18, "report": 14, "robots": 6, "run": 16, "stability": 32, "tmt": 38, "truth": 2,
 }  # fmt: skip
 LONGEST = 10  # tests that are listed
 

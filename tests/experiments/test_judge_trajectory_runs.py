@@ -219,7 +219,7 @@ def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(followed, t
     pictures = list(gif.drawn(pair, "TMT"))
     places = []
     for picture in pictures:
-        pixels = np.asarray(picture.convert("RGB"), int)[80:-30]  # below the names
+        pixels = np.asarray(picture.convert("RGB"), int)[64:-24]  # below the names
         near = [np.abs(pixels - colour).max(axis=2) < 12 for colour in (BLUE, ORANGE)]
         places.append(
             [of.any() and (np.argwhere(of).min(axis=0), np.argwhere(of).max(axis=0)) for of in near]
@@ -229,4 +229,4 @@ def test_the_gif_shows_each_engine_where_it_is_until_it_has_diverged(followed, t
     assert apart[0] > 60 and apart[1] < 12  # pixels
     gif.Animation([pair], "TMT").savefig(tmp_path / "motion.gif")
     with Image.open(tmp_path / "motion.gif") as image:
-        assert (image.n_frames, image.size) == (3, (640, 420))
+        assert (image.n_frames, image.size) == (3, (512, 336))
