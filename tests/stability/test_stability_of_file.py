@@ -77,7 +77,7 @@ def test_the_step_that_is_asked_for_is_judged(dt, asked, quantity, passes):
 
 
 @pytest.mark.parametrize("actuator, asked, servos", [
-    (SERVO, {"kp": 5.0}, True), ('<intvelocity joint="turn" kp="0"/>', {"kp": 5.0}, False), (MOTOR, {}, False)
+    (SERVO, {"kp": 5.0}, True), ('<intvelocity joint="turn" kp="0" actrange="-1 1"/>', {"kp": 5.0}, False), (MOTOR, {}, False)
 ])  # fmt: skip
 def test_why_no_program_can_command_it_is_said_once_for_all_postures(actuator, asked, servos):
     (check,) = found_of(actuator, alone=True, control_period=0.01, **asked).checks
