@@ -16,7 +16,7 @@ from compare.core.errors import Refused
 from compare.fleet import executors as module
 from compare.fleet.executors import Cluster, Pool
 
-HERE = Path(__file__).resolve().parent
+TESTS = Path(__file__).resolve().parents[1]
 
 
 @runs.posix
@@ -46,7 +46,7 @@ class Machines:
             return json.loads(self.file.read_text())["address"]
 
     def start(self, what, *options):
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (runs.ROOT, HERE)))}
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, (runs.ROOT, TESTS)))}
         words = [sys.executable, "-m", "dask", what, *options, "--scheduler-file", str(self.file)]
         streams = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
         run = subprocess.Popen(words, cwd=self.folder, env=environment, start_new_session=True, **streams)
