@@ -113,7 +113,7 @@ def costs(joints: int, folder: str) -> dict[str, float]:
 
 
 def draw(table: pandas.DataFrame, path: Path) -> None:
-    figure = Figure((7.5, 3.4), layout="constrained")
+    figure = Figure((9.0, 3.4), layout="constrained")
     shown = {
         "all --quick, processor time, s": {"run_processor_s": "whole run", "c_s": "three quantities as C"},
         "one mass matrix, us": {"M_mujoco_us": "MuJoCo", "M_tmt_us": "TMT, compiled"},
@@ -125,9 +125,11 @@ def draw(table: pandas.DataFrame, path: Path) -> None:
     for ax, (title, columns) in zip(figure.subplots(1, 3), shown.items()):
         for (column, label), marker, colour in zip(columns.items(), "os", ("#0072B2", "#E69F00")):
             ax.loglog(table["joints"], table[column], marker=marker, color=colour, label=label)
-        ax.set(xlabel="joints of the chain", title=title)
+        ax.set(xlabel="joints of the chain", ylabel=title)
+        ax.set_xticks(table["joints"], table["joints"])
+        ax.tick_params(which="minor", labelbottom=False, labelleft=False)
         ax.grid(alpha=0.3)
-        ax.legend(frameon=False, fontsize=8)
+        ax.legend(frameon=False, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     figure.savefig(path, dpi=110)
 
 
