@@ -103,7 +103,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     free = take_out(scene)
     locks = lockable(scene, allowed)
     made = {
-        "source": str(reading.source),
+        "source": shown_path(str(reading.source)),
         "scene": scene.name,
         "duration": scene.duration,
         "allowed": allowed,
@@ -133,7 +133,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     result.top.append(result.finding(
         "answer", about=made, unit=movement_unit(coordinates_of(scene)), names=names, moved=scene.use.moved,
         models=models, free=[row for row in free if row.same_bits], actuators=sorted(actuators), error=error,
-        written=write if is_written else "", refused=write and not is_written,
+        written=shown_path(write) if write and is_written else "", refused=write and not is_written,
         assets=assets_of(draft).name if files_of(model.spec) else "",
     ))  # fmt: skip
 
