@@ -14,7 +14,7 @@ from ..engines.mujoco.reading import Reading
 from .motion import Posture, motion_of
 from .push import PUSHES, USUAL, WITHIN, Limit, Pushed
 from .remedies import Remedy, creep_stops, remedies, shorter_steps
-from .runs import FAST, WAYS, Trial
+from .runs import FAST, Trial, in_threads
 from .search import largest
 
 DRAWN = (0.03, 0.1, 0.3)  # rad/s or m/s: pushes of the picture
@@ -154,19 +154,20 @@ def answer(reading: Reading, posture: Posture, question: Question) -> Answer:
     times = period or 0.0, question.delay or 0.0
     pushed = Pushed(motion, question.dt, question.integrator, question.push, *times)
     pushed.find_truth(PUSHES[-1] if question.drawn else USUAL)
-    rows = [row_of(pushed, name, question) for name in question.integrators]
+    rows = in_threads(lambda name: row_of(pushed, name, question), question.integrators)
     found = Answer(rows, [], [], [], [], None, {})
     row, own = rows[0], found.own
     if question.drawn and row.judged_by == "rest" and period is None:
-        for push in DRAWN:
-            for name in question.integrators if push <= pushed.survived else ():
-                pushed.limit(push, name, surely=push == pushed.push)
+        for push in (push for push in DRAWN if pushed.push != push <= pushed.survived):
+            known_steps = [(push, row.integrator, False, row.stable_up_to_s) for row in rows]
+            in_threads(lambda asked: pushed.limit(*asked), known_steps)
     if question.helped and own and own.stable_at_file_dt is False:
         helps = remedies(pushed) if period is None else shorter_steps(pushed)
         found = found._replace(remedies=helps, smaller=smaller_push(pushed, own))
     if question.helped and row.creep_rad_per_s > CREEPS:
         found = found._replace(stops=creep_stops(pushed, pushed.creep()[1]))
-    for trial, verdict in pushed.tried.items():
+    places = {name: place for place, name in enumerate(question.integrators)}  # threads end in any order
+    for trial, verdict in sorted(pushed.tried.items(), key=lambda one: places[one[0].integrator]):
         found.tried.append(TriedRow(
             posture=posture.name, integrator=trial.integrator, push_rad_per_s=trial.push, dt_s=trial.dt,
             outcome=verdict.why or "holds", end_speed_rad_per_s=known(verdict.speed), apart=known(verdict.apart),
@@ -194,7 +195,7 @@ def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:
     if row.judged_by in ("", "falls"):
         return row
     row.place = "by chance" if pushed.place_is_chance(push) else ""
-    row.fine_apart = known(max(pushed.twice(push, way) for way in range(WAYS)))
+    row.fine_apart = known(pushed.fine_apart(push))
     limit, trial = limit_of(pushed, row, push), Trial(push, dt, integrator, pushed.period)
     if period is None:
         pushed.sure(trial)

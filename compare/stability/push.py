@@ -221,8 +221,8 @@ class Pushed(Runs):
         whys = [why for why, *_ in self.further(trial, range(WAYS + MORE_WAYS))]
         return 3 * sum(map(bool, whys)) >= len(whys)
 
-    def limit(self, push: float, integrator: str, surely: bool = True) -> Limit:
-        """The longest step after a push, from the step in use upwards or downwards.
+    def limit(self, push: float, integrator: str, surely: bool = True, first: float | None = None) -> Limit:
+        """The longest step after a push, sought upwards or downwards from the first, by default the one in use.
 
         surely: it, and one that is shorter by BELOW, hold after further patterns too, and so does the one in
         use; a factor ABOVE above the one that fails, a third of all patterns fail. Between both it depends on
@@ -241,7 +241,7 @@ class Pushed(Runs):
             )
 
         ends = self.fine_dt, self.longest, WITHIN
-        low, high = largest(lambda dt: self.verdict(trial(dt)).holds, self.dt, *ends)
+        low, high = largest(lambda dt: self.verdict(trial(dt)).holds, first or self.dt, *ends)
         if surely and low is not None and not is_sure(low):
             lower, higher = largest(is_sure, low, self.fine_dt, low, WITHIN)
             while lower is not None and failed()[0] < lower:  # where it is chance, on the way

@@ -1,7 +1,11 @@
 """Runs of a motion after pushes: by any step and integrator, and by the fine steps that are taken for the truth."""
 
+import os
+import threading
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import mujoco
 import numpy as np
@@ -11,6 +15,8 @@ from ..engines.mujoco.names import bit, matrix
 from ..engines.mujoco.stepper import Stepper, distance
 from .motion import Motion
 
+T = TypeVar("T")
+U = TypeVar("U")
 WAYS, MORE_WAYS = 4, 8  # patterns of signs, and further ones for the step that is found
 LASTS, MOST_STEPS = 3.0, 20_000  # s and steps of a run
 STILL, STILLER = 0.05, 0.01  # rad/s or m/s: what is still after a push, and after a small one
@@ -71,7 +77,7 @@ class Runs:
         self.lasts = min(motion.times[-1] if len(motion.times) else LASTS, MOST_STEPS * self.fine_dt)
         rng, nv = np.random.default_rng(0), motion.model.nv
         self.signs = [np.sign(rng.normal(size=nv)) for _ in range(WAYS + MORE_WAYS)]
-        self.made, self.stepper = (dt, integrator, False), Stepper(self.model, dt, integrator)
+        self.stepper, self.of_thread = Stepper(self.model, dt, integrator), threading.local()
         speeds = motion.state[self.stepper.places["qvel"]]
         self.is_in_motion = bool(speeds.any() or len(motion.times))
         self.truth = integrator  # of fine runs
@@ -83,20 +89,25 @@ class Runs:
         state[self.stepper.places["qvel"]] += push * self.signs[way]
         return state
 
+    def stepper_of(self, *what: Any) -> Stepper:
+        """That of a model, a step and an integrator in this thread, which keeps the last one."""
+        if getattr(self.of_thread, "what", None) != what:
+            self.of_thread.what, self.of_thread.stepper = what, Stepper(*what)
+        return self.of_thread.stepper
+
     def run(
         self, trial: Trial, way: int, fast: float = FAST, lasts: float = 0.0, is_fine: bool = False
     ) -> Run:
         """A run. It ends early where it diverges, is faster than `fast`, or is still and stays so. lasts: s, 0.0: as usual."""
         (push, dt, integrator, period), motion = trial, self.ideal if is_fine else self.motion
-        if self.made != (dt, integrator, is_fine):
-            self.made, self.stepper = (dt, integrator, is_fine), Stepper(motion.model, dt, integrator)
+        stepper = self.stepper_of(motion.model, dt, integrator)
         nv, state = self.model.nv, self.start(push, way, motion)
-        self.stepper.put(state)
+        stepper.put(state)
         count, calm, done = max(4, round((lasts or self.lasts) / dt)), round(CALM / dt), 0
         quiet = min(STILL, push / 2.0) / 5.0 if push else QUIET
         q, speeds, failed = np.zeros((count, self.model.nq)), np.zeros((count, nv)), False
-        for steps, controls in motion.parts(self.stepper, count, period, self.delay):
-            rolled, part = self.stepper.roll(state, steps, controls), slice(done, done + steps)
+        for steps, controls in motion.parts(stepper, count, period, self.delay):
+            rolled, part = stepper.roll(state, steps, controls), slice(done, done + steps)
             q[part], speeds[part], state = rolled.q[0], np.abs(rolled.v[0]), rolled.states[0]
             bad = ~(speeds[part].max(axis=1) < fast)
             failed = bool(bad.any())
@@ -126,7 +137,7 @@ class Runs:
         return self.fine[key]
 
     def fine_runs(self, push: float) -> list[Run]:
-        return [self.fine_run(push, way) for way in range(WAYS)]
+        return in_threads(lambda way: self.fine_run(push, way), range(WAYS))
 
     @property
     def unpushed(self) -> Run:
@@ -139,11 +150,15 @@ class Runs:
             self.by_twice[push, way] = self.apart(run, self.fine_run(push, way)) if run.is_finite else np.inf
         return self.by_twice[push, way]
 
+    def fine_apart(self, push: float) -> float:
+        """How far runs of two fine steps end from each other at most, rad or m."""
+        return max(in_threads(lambda way: self.twice(push, way), range(WAYS)))
+
     def place_is_chance(self, push: float) -> bool:
         """Whether fine runs of other signs, or of twice the step, end elsewhere."""
         first, *others = self.fine_runs(push)
         spread = max(self.apart(first, other) for other in others)
-        return spread > BY_CHANCE or any(self.twice(push, way) > BY_CHANCE for way in range(WAYS))
+        return spread > BY_CHANCE or self.fine_apart(push) > BY_CHANCE
 
     def still(self, push: float) -> float:
         """The largest speed that is rest after a push, rad/s or m/s."""
@@ -209,3 +224,9 @@ def without_sensors(motion: Motion) -> Motion:
     """The motion of a model without its sensors, which take time and move nothing."""
     model = motion.model
     return motion._replace(model=changed(model, disableflags=model.opt.disableflags | bit("SENSOR")))
+
+
+def in_threads(function: Callable[[T], U], items: Iterable[T]) -> list[U]:
+    """The values of a function, in threads: MuJoCo steps without Python's lock."""
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        return [*threads.map(function, items)]
