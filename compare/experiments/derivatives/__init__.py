@@ -15,7 +15,6 @@ from ...core.timing import fastest
 from ...engines.mujoco import Mujoco
 from ...engines.mujoco.engine import methods_for
 from ...engines.mujoco.names import INTEGRATORS
-from ...engines.mujoco.reading import Reading
 from ...judge.scale import FACTOR
 from ...robots import Robot
 from ...robots.states import singular_positions
@@ -72,12 +71,16 @@ def rows(setup: Setup) -> Result:
     setup.quiet()  # nothing else may run while times are taken
     add_times(setup, subject, table)
     result.tables["derivative_costs"] = table
+    place = None
+    if setup.reading and (setup.alone or setup.size == "full"):
+        place = standing.Standing(setup.reading)
+        add_standing(result, place, function)
     if all(check.passed for check in result.checks):  # else the exact values are not of the file's equations
         about = {"integrator": integrator, "dt": dt, "scene": case.name, "states": len(exact)}
-        result.headline = result.finding("headline", row=table[0])
-        result.top.append(result.finding("answer", about=about, rows=table, by=subject.by))
-    if setup.reading and (setup.alone or setup.size == "full"):
-        add_standing(result, setup.reading)
+        about["acting"] = bool(place and place.acting)
+        answer = result.finding("answer", about=about, rows=table, by=subject.by)
+        result.headline = result.headline or result.finding("headline", row=table[0])
+        result.top.insert(1 if place and place.stands else 0, answer)
     return result
 
 
@@ -99,23 +102,30 @@ def add_times(setup: Setup, subject: Subject, table: list[WayRow]) -> None:
         row.time = 1e6 * seconds[row.way]
 
 
-def add_standing(result: Result, reading: Reading) -> None:
+def add_standing(result: Result, place: standing.Standing, function: str) -> None:
     """Differences where the file stands, and the directions that no control moves there."""
-    place, m, best, names = standing.Standing(reading), reading.model, None, list[str]()
+    m, best, names = place.stepper.model, None, list[str]()
     rows, truth = place.rows()
     if truth is not None:
-        best = ways.best_of("standing", {row.eps: row.error for row in rows})
+        best = ways.best_of(function, {row.eps: row.error for row in rows})
         if m.nu:
-            units = np.repeat([1.0, reading.dt, 1.0], [m.nv, m.nv, m.na])
+            units = np.repeat([1.0, place.stepper.dt, 1.0], [m.nv, m.nv, m.na])
             names = standing.directions(
                 place.stepper, standing.not_moved(place.values(best.eps or 0.0), truth, units)
             )
     if place.acting:
         result.tables["contact_derivatives"] = rows
     limits = sorted(name for name in place.acting if name.startswith("limit of "))
-    about = {"posture": place.name, "contacts": len(place.acting) - len(limits), "limits": limits}
+    about = {
+        "posture": place.name,
+        "way": function,
+        "contacts": len(place.acting) - len(limits),
+        "limits": limits,
+    }
     opened = next((row for row in reversed(rows) if row.changed), None)
     result.top.append(result.finding("standing", about=about, best=best, opened=opened, names=names))
+    if place.stands and best:
+        result.headline = result.finding("headline", row=best, posture=place.name)
 
 
 def figures(result: Result, robot: Robot) -> Iterator[Drawing]:

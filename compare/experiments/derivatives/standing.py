@@ -35,18 +35,23 @@ class ContactRow(Row):
 
 
 class Standing:
-    """The state in the first second from the first posture in which a file accelerates least on contacts or limits."""
+    """The state in the first second from the first posture in which a file accelerates least on contacts or limits.
+
+    stands: it accelerates no less at any state without them.
+    """
 
     def __init__(self, reading: Reading) -> None:
         posture = postures_of(reading)[0]
         self.name, self.stepper = posture.name, Stepper(reading.model, reading.dt, reading.integrator)
         state, least, self.acting = self.stepper.start(posture.key), np.inf, set[str]()
-        self.state = state
+        self.state, stillest = state, np.inf
         for data in self.stepper.watch(state, min(MOST_STEPS, round(DURATION / reading.dt))):
             size = float(np.abs(data.qacc).max(initial=0.0))
+            stillest = min(stillest, size)
             if size < least and (found := acting(self.stepper.model, data)):
                 least, self.state, self.acting = size, state, found
             state = self.stepper.state()
+        self.stands = bool(self.acting) and least <= stillest
 
     def values(self, eps: float) -> Array:
         """[A B] by movements, speeds, activations and controls, centred: (n, n + nu), n = 2 nv + na."""
