@@ -113,7 +113,7 @@ def test_the_table_of_a_run_alone_has_a_line_for_each_integrator_and_few_lines_i
     ({"stable": None, "judged_by": "falls"}, "Not judged"),
 ])  # fmt: skip
 def test_each_outcome_has_its_answer(result, more, words):
-    of_file.tell(result, "answer", row=row(**more), rows=[])
+    of_file.tell(result, "answer", row=row(**more), rows=[], others=[])
     assert words in say(result.top[0])
 
 
@@ -146,6 +146,23 @@ def test_other_postures_are_told_and_the_headline_is_of_the_posture_of_the_table
     assert first.values["row"] is rows[0] and f'from "{rows[0].posture}"' in say(first)
     result.tables["step_limits"] = [replace(rows[0], stable_at_file_dt=None)]
     assert of_file.headline(result) is None
+
+
+@pytest.mark.parametrize("other, first, words", [
+    ("", "Stable: 2 ms with Euler", ""), ("crouch", 'Stable from "p", not from "crouch": 2 ms', ', not from "crouch"'),
+    ("sit", 'Stable from "p", not judged from "sit": 2 ms', ', not judged from "sit"'),
+])  # fmt: skip
+def test_the_first_line_names_postures_at_which_the_step_is_not_stable(result, other, first, words):
+    """The exit status is that of all postures."""
+    changes = {
+        "crouch": row(0.001, 0.00106, False, posture="crouch"),
+        "sit": row(None, None, None, posture="sit"),
+    }
+    rows = [changes.get(other, row(posture="lies")), row(posture="stand")]
+    of_file.tell(result, "answer", row=row(), rows=[], others=rows)
+    assert say(result.top[0]).startswith(first)
+    result.tables["step_limits"] = [row(), *rows]
+    assert say(of_file.headline(result)).endswith(f'from "p"{words}')
 
 
 def test_the_longest_step_within_an_error_is_told(result):

@@ -66,7 +66,8 @@ def add(
         check(result, each.rows[0], quantity)
     first, row, rows = answers[0], answers[0].rows[0], answers[0].rows
     result.repeated["runs"] = first.recipes
-    tell(result, "answer", row=row, rows=rows if is_alone else [])
+    others = [each.rows[0] for each in answers[1:]]
+    tell(result, "answer", row=row, rows=rows if is_alone else [], others=others)
     if error is not None:
         tell(result, "within", rows=rows, error=error)
     tell_of_row(result, row)
@@ -82,7 +83,7 @@ def add(
             tell(result, "remedies", row=row, integrators=stable, remedies=first.remedies)
     if row.creep_rad_per_s > CREEPS:
         tell(result, "creep", row=row, stops=first.stops)
-    if others := [each.rows[0] for each in answers[1:]]:
+    if others:
         unstable = [row for row in others if row.stable_at_file_dt is False]
         tell(result, "others", rows=others, unstable=unstable)
 
@@ -116,6 +117,8 @@ def check(result: Result, row: StepLimitRow, quantity: str) -> None:
 
 
 def headline(result: Result) -> Finding | None:
-    """Whether the step in use is stable, at the posture that the answer and its table are of."""
-    row = next((row for row in result.tables["step_limits"] if row.integrator == row.file_integrator), None)
-    return None if row is None or row.stable_at_file_dt is None else result.finding("headline", OF, row=row)
+    """Whether the step in use is stable, at the posture that the answer and its table are of, and at the others."""
+    rows = [row for row in result.tables["step_limits"] if row.integrator == row.file_integrator]
+    if not rows or rows[0].stable_at_file_dt is None:
+        return None
+    return result.finding("headline", OF, row=rows[0], others=rows[1:])
