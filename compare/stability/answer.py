@@ -33,7 +33,7 @@ class StepLimitRow(Row):
     length. stable_up_to_s: None: no step down to fine_dt_s; fails_at_s: None: all that are tried hold.
     moves_first: the joint of the run that fails. end_speed: the largest in the last quarter of the runs, at
     the step in use and at fine steps. apart: the largest distance from fine runs on the way, at the step in
-    use; within_error_s: the longest step that stays within --error. judged_by: rest; speed, it coasts or is
+    use; within_error_s: the longest stable step that stays within --error. judged_by: rest; speed, it coasts or is
     in motion; divergence, it moves on by itself; falls, a stated push is survived at no step; "", no fine run
     is finite. outcome: of the step in use: holds, moves, grows, elsewhere, diverges. survived: the largest
     push that fine runs survive of those that were tried. fine_apart: of two fine steps. kept: the share of
@@ -209,8 +209,9 @@ def row_of(pushed: Pushed, integrator: str, question: Question) -> StepLimitRow:
         tried = pushed.verdict(Trial(push, step, integrator))
         return tried.holds and tried.apart <= (question.error or 0.0)
 
-    if (question.error or 0.0) > (row.fine_apart or 0.0):  # fine runs know no less
-        row.within_error_s, _ = largest(is_near, dt, pushed.fine_dt, pushed.longest, WITHIN)
+    most = (row.stable_up_to_s or 0.0) if period is None else pushed.longest
+    if most and (question.error or 0.0) > (row.fine_apart or 0.0):  # fine runs know no less
+        row.within_error_s, _ = largest(is_near, min(dt, most), pushed.fine_dt, most, WITHIN)
     return row
 
 

@@ -74,7 +74,7 @@ def step_limits(
         rad/s or m/s, of every speed. By default 0.1, or the largest smaller one that is survived at fine
         steps.
     error : float, optional
-        rad or m: `within_error_s` is the longest step that stays so near the run of fine steps.
+        rad or m: `within_error_s` is the longest stable step that stays so near the run of fine steps.
     control_period, delay : float, optional
         s: a program has the servos, reads every period, and acts a delay later; `stable_up_to_s` is the
         longest period.

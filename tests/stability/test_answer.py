@@ -82,6 +82,12 @@ def test_a_shorter_step_in_the_same_period_is_a_remedy(stiffness, ms):
     assert limits.index(True) == (2, 4).index(20.0 / ms[0]) + 1 if ms else not any(limits)
 
 
+def test_the_longest_step_within_an_error_is_no_longer_than_the_stable_one():
+    """A trunk on legs: the usual patterns of signs hold at a longer step, further ones do not."""
+    row = euler(walker(50), error=1.0)
+    assert row.within_error_s == row.stable_up_to_s
+
+
 def test_what_does_not_move_has_no_answer():
     with pytest.raises(ValueError, match="no joint"):
         compare.step_limits(STILL)

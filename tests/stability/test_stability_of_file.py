@@ -170,7 +170,7 @@ def test_the_longest_step_within_an_error_is_told(result):
     of_file.tell(result, "within", rows=near, error=0.01)
     of_file.tell(result, "within", rows=[row()], error=1e-9)
     first, second = said(result, "within")
-    assert "9 ms with RK4" in first and "Euler: 4 ms" in first and "No step" in second
+    assert "9 ms with RK4" in first and "Euler: 4 ms" in first and "No stable step" in second
 
 
 @pytest.mark.parametrize("dt, is_refused", [(None, False), (1e-3, False), (1.1e-5, False), (0.9e-5, True)])
