@@ -170,6 +170,24 @@ def test_the_smaller_file_starts_where_the_motion_does(tmp_path):
     assert np.abs(apart).max() <= told(result)["error"] <= 1e-3
 
 
+RANGES = """<mujoco><compiler angle="{0}"/><default><joint damping="1"/>
+<default class="c"><joint range="{1}"/></default></default>
+<worldbody><body><joint name="a" axis="0 1 0" class="c"/><joint name="s" type="slide" axis="1 0 0" range="-1 1"/>
+<geom size="0.1"/></body></worldbody><actuator><position joint="a" inheritrange="1" kp="3"/></actuator>
+<keyframe><key name="set" ctrl="0.3" qvel="0.1 0.1"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("angle, limits", [("degree", "-71.23456789 50"), ("radian", "-1.23456789 0.9")])
+def test_the_range_of_a_limit_that_is_taken_out_stays_the_same_in_the_written_file(tmp_path, angle, limits):
+    """It states radians; a servo has the range of its joint."""
+    text, path = RANGES.format(angle, limits), tmp_path / "smaller.xml"
+    assert failed(answered(text, write=str(path), error=1e-9)) == []
+    whole, small = mujoco.MjModel.from_xml_string(text), mujoco.MjModel.from_xml_path(str(path))
+    assert whole.jnt_limited.all() and not small.jnt_limited.any()
+    assert small.jnt_range == pytest.approx(whole.jnt_range, rel=1e-15)
+    assert small.actuator_ctrlrange == pytest.approx(whole.actuator_ctrlrange, rel=1e-15)
+
+
 def test_the_result_goes_to_the_process_that_draws(two_arms):
     result = pickle.loads(pickle.dumps(two_arms[0]))
     names = [name for name, *_ in (figure() for figure in reduction.figures(result, None))]

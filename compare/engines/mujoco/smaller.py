@@ -103,9 +103,14 @@ def tendons(small: Smaller, use: Use) -> int:
 
 
 def limits(small: Smaller, use: Use) -> int:
-    """Limits of joints and tendons that never act; their ranges stay, as a servo may have the same."""
+    """Limits of joints and tendons that never act; their ranges stay, as a servo may have the same.
+
+    MuJoCo turns the range of a joint into rad only where it is a limit.
+    """
     model, acted = small.model, use.acted
     ends = [x for x in small.spec.joints if model.jnt_limited[x.id] and x.name not in acted["joint"]]
+    for joint in ends:
+        joint.range = model.jnt_range[joint.id]
     ends += [x for x in small.spec.tendons if model.tendon_limited[x.id] and x.name not in acted["tendon"]]
     for element in ends:
         element.limited = OFF
