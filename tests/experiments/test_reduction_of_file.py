@@ -170,7 +170,7 @@ def test_the_smaller_file_starts_where_the_motion_does(tmp_path):
     assert np.abs(apart).max() <= told(result)["error"] <= 1e-3
 
 
-RANGES = """<mujoco><compiler angle="{0}"/><default><joint damping="1"/>
+RANGES = """<mujoco><compiler angle="{0}"/><option gravity="0 0 0"/><default><joint damping="1"/>
 <default class="c"><joint range="{1}"/></default></default>
 <worldbody><body><joint name="a" axis="0 1 0" class="c"/><joint name="s" type="slide" axis="1 0 0" range="-1 1"/>
 <geom size="0.1"/></body></worldbody><actuator><position joint="a" inheritrange="1" kp="3"/></actuator>
