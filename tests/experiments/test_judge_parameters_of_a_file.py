@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from helpers.edited import XML, setup_of, setup_of_file
 from models import PATHS
+from scipy.spatial.transform import Rotation
 
 from compare.core.check import Result
 from compare.engines.mujoco.parameters import Stated
@@ -175,3 +176,43 @@ def test_six_digits_move_a_number_by_no_more_than_their_tolerance(share, are_rou
     com, axis = (Stated("b", name, there, there + off, tolerance=1e-15) for name in ("com", "axis"))
     causes = causes_of([compare_number(result, each, "") for each in (com, axis)], ("here", "there"))
     assert (len(causes) == 1 and causes[0].rank == 3) == are_rounded
+
+
+MOMENTS = 1.0, 2.0, 2.5
+
+
+def tensor(moments, degrees=0.0, axis=(0.0, 0.0, 1.0)):
+    R = Rotation.from_rotvec(np.deg2rad(degrees) * np.array(axis) / np.linalg.norm(axis)).as_matrix()
+    return R @ np.diag(moments) @ R.T
+
+
+STRAIGHT, TURNED, ALL = (
+    tensor(MOMENTS),
+    tensor(MOMENTS, 40, (1, -2, 3)),
+    "inertia xx, xy, xz, yy, yz, zz of b",
+)
+SIXTH, SEVENTH = (tensor([1.0, 2.0, 2.5 * (1.0 + off)], 40, (1, -2, 3)) for off in (1.1e-5, 0.9e-5))
+
+
+@pytest.mark.parametrize("there, here, place, degrees", [
+    (STRAIGHT, TURNED, "inertia of b", 40), (TURNED, STRAIGHT, "inertia of b", 40),
+    (STRAIGHT, tensor(MOMENTS, 30), "inertia of b", 30), (STRAIGHT, SEVENTH, "inertia of b", 40), (STRAIGHT, SIXTH, ALL, None),
+    (tensor([2.0, 2.0, 0.5]), tensor([2.0, 2.0, 0.5], 130, (1, 1, 0)), "inertia of b", 50),  # of a rod
+    (STRAIGHT, tensor([2.0, 1.0, 2.5]), "inertia xx, yy of b", None),  # exchanged
+    (STRAIGHT + 1e-4 * (1.0 - np.eye(3)), STRAIGHT, "inertia xy, xz, yz of b", None),  # left out
+])  # fmt: skip
+def test_a_tensor_that_one_rotation_explains_is_turned(there, here, place, degrees):
+    inertia = Stated("b", "inertia", there.ravel(), here.ravel(), tolerance=1e-15)
+    com = Stated("b", "com", np.zeros(3), np.array([0.0, 0.1, 0.0]), tolerance=1e-15)
+    result = Result("parameters")
+    numbers = [compare_number(result, number, "") for number in (inertia, com)]
+    causes = causes_of(numbers if degrees else numbers[:1], ("here", "there"))
+    assert [cause.place for cause in causes] == [place, "com y of b"][: 1 + bool(degrees)]
+    assert degrees is None or causes[0].explains == pytest.approx(degrees, rel=1e-4)
+
+
+def test_an_inertial_frame_that_a_conversion_did_not_turn_is_one_cause(tmp_path):
+    quat = "0.8 0.2 -0.4 0.4"
+    link = f"<mujoco><worldbody>{small_link('0.1 0 -0.5', quat, '0.11 0.09 0.04')}</worldbody></mujoco>"
+    (cause,) = beside_solution(tmp_path, link.replace(quat, "1 0 0 0"), link).causes
+    assert cause.place == "inertia of b" and cause.explains == pytest.approx(2.0 * np.rad2deg(np.arccos(0.8)))

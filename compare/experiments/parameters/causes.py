@@ -1,6 +1,7 @@
 """The causes of numbers that differ: one for a body or joint, and one for numbers that differ alike."""
 
 from collections.abc import Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,12 @@ def causes_of(numbers: Sequence[Compared], sides: Sequence[str]) -> list[Cause]:
     written = [number for number in left if relative(number) <= SIX_DIGITS]
     if sum(np.count_nonzero(number.differs) for number in written) > 1:
         explain("six_digits", written, most=max(map(relative, written)))
+    for number in [number for number in left if number.quantity == "inertia"]:
+        if SIX_DIGITS < relative(number) < np.inf and (turn := rotation_of(number)) is not None:
+            angle = float(np.linalg.norm(turn))
+            explain(
+                "rotated", [number], rotation=(turn / angle).tolist(), stated=0.0, explains=np.rad2deg(angle)
+            )
     while left:
         first = left[0]
         same = [number for number in left if number.quantity == first.quantity]
@@ -59,6 +66,29 @@ def causes_of(numbers: Sequence[Compared], sides: Sequence[str]) -> list[Cause]:
         together = [number for number in left if number.place == first.place and number.quantity in kinds]
         explain("differ", together if first in together else [first])
     return causes
+
+
+def rotation_of(number: Compared) -> np.ndarray | None:
+    """The least rotation vector, rad, that turns the tensor there to the one here; None: none does.
+
+    Principal moments are compared to six digits. Two numbers, or products of inertia alone, that differ are no
+    rotation. Of a body of revolution the axis is turned, no further about itself.
+    """
+    from scipy.spatial.transform import Rotation  # slow import
+
+    (sizes, axes), (others, turned) = (np.linalg.eigh(x.reshape(3, 3)) for x in (number.there, number.here))
+    least = SIX_DIGITS * np.abs(sizes).max()
+    if np.abs(others - sizes).max() > least or len(number.shown) < 3 or not number.differs[[0, 4, 8]].any():
+        return None
+    if (gaps := np.diff(sizes)).min() <= least:
+        k = 0 if gaps[1] <= least else 2
+        sense = -1.0 if axes[:, k] @ turned[:, k] < 0.0 else 1.0
+        normal = np.cross(axes[:, k], sense * turned[:, k])
+        size = np.linalg.norm(normal)
+        return np.asarray(normal / size * np.arctan2(size, sense * axes[:, k] @ turned[:, k]))
+    matrices = [turned * signs @ axes.T for signs in product((1.0, -1.0), repeat=3)]
+    proper = [matrix for matrix in matrices if np.linalg.det(matrix) > 0.0]
+    return np.asarray(min(Rotation.from_matrix(proper).as_rotvec(), key=np.linalg.norm))
 
 
 def relative(number: Compared) -> float:
