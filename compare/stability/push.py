@@ -141,7 +141,7 @@ class Pushed(Runs):
             fast = max(FAST, 10.0 * float(fine.most.max()))
             run = self.run(trial, way, fast)
             why = self.failure(run, fine, push, is_chance)
-            if why == "grows":  # a longer run shows whether it goes on
+            if why in ("moves", "grows"):  # a longer run shows whether it goes on
                 run = self.run(trial, way, fast, LONGER * self.lasts)
                 why = self.failure(run, fine, push, is_chance)
             runs.append(run)
