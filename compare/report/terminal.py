@@ -3,7 +3,7 @@
 import re
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from textwrap import TextWrapper
 from typing import IO, cast
@@ -27,8 +27,9 @@ class Terminal:
         self.out, self.err = Stream(None if is_silent else sys.stdout), Stream(sys.stderr)
         self.lines, self.screen = console(self.out), console(self.err)
         self.status: Status | None = None
-        self.text, self.since = "", time.monotonic()
-        self.how_far: Callable[[], list[str]] = list  # count, name: before the text; asked at every moment
+        # what is before the text, the text, and since when: replaced at once, as another thread reads them
+        self.shown: tuple[list[str], str, float] = [], "", time.monotonic()
+        self.how_far: Callable[[], list[str]] = list  # before these, of a fleet; asked at every moment
 
     def say(self, text: str = "", style: str = "") -> None:
         """Print a line; on a narrower terminal without wide gaps if it fits then, else wrapped."""
@@ -51,8 +52,9 @@ class Terminal:
             self.say(line, style)
             style = ""
 
-    def show(self, text: str) -> None:
-        self.text, self.since = text, time.monotonic()
+    def show(self, text: str, before: Sequence[str] = ()) -> None:
+        """Show the progress from now on. before: the number and the name of what is under way."""
+        self.shown = list(before), text, time.monotonic()
 
     @contextmanager
     def progress(self, text: str) -> Iterator[None]:
@@ -70,14 +72,15 @@ class Terminal:
     def line(self) -> str:
         """The progress, as far as there is room, no name twice; for how long, where it takes long."""
         self.screen.width = max(self.err.columns() or 80, 20)
-        parts, text = self.how_far(), in_one_line(self.text)
+        before, shown, since = self.shown
+        parts, text = [*self.how_far(), *before], in_one_line(shown)
         for part in parts:
             text = text.removeprefix(f"{part}: ")
         name, seconds = interrupt.waited_for()
         if seconds > LONG:
             text = f"waiting for {name}"
         else:
-            seconds = time.monotonic() - self.since
+            seconds = time.monotonic() - since
         for_long = f", {seconds:.0f} s" if seconds > LONG else ""
         room = self.screen.width - 6 - len(for_long)  # the spinner, and what a terminal shows of Ctrl-C
         line = ": ".join(filter(None, (", ".join(parts), text)))

@@ -8,7 +8,6 @@ import time
 import webbrowser
 from collections.abc import Sequence
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -144,10 +143,9 @@ def compute(
         from . import examine
 
         origin = provenance(command, robot.mjcf, compared.reference.file, SEED)  # of the model as it was read
-        of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "progress": terminal.show}
-        of_run["tell"] = terminal.say
+        of_run: dict[str, Any] = {"map": workers.map, "quiet": workers.quiet, "tell": terminal.say}
+        of_run["progress"] = lambda text: terminal.show(text, examine.progress(workers.clock, names))
         setup = examine.setup_of(compared, options, alone=is_alone, command=command, **of_run)
-        terminal.how_far = partial(examine.progress, workers.clock, names)
         run = examine.Run(names, setup, folder, terminal, workers, workers.clock)
         report = written()
         if left_out:

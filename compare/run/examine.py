@@ -274,5 +274,5 @@ def add_crash(result: Result, quantity: str, error: Exception) -> None:
 
 def progress(clock: Clock, names: Sequence[str]) -> list[str]:
     """How far a run of these experiments is: "4 of 11", "acceleration"."""
-    number = 1 + sum(name in clock.ended for name in names)
+    number = 1 + sum(name in clock.ended for name in names if name != clock.under_way)
     return [f"{number} of {len(names)}", clock.under_way] if clock.under_way in names else []

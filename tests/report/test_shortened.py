@@ -132,8 +132,7 @@ def test_any_name_of_a_file_in_any_locale_and_any_reader(tmp_path, line, model, 
 def test_the_line_of_progress_fits(columns, line):
     terminal = Terminal()
     terminal.err.columns = lambda: columns
-    terminal.how_far = lambda: ["9 of 11", "speed"]
-    terminal.show("speed: timing")
+    terminal.show("speed: timing", ["9 of 11", "speed"])
     assert terminal.line() == line and len(line) <= columns - 6
 
 

@@ -158,6 +158,20 @@ def test_progress_counts_from_one():
     assert experiment.progress(clock, ["mass", "gravity", "speed"]) == []
     clock.under_way = "gravity"
     assert experiment.progress(clock, ["mass", "gravity", "speed"]) == ["2 of 3", "gravity"]
+    clock.ended |= {"gravity": 0.2, "speed": 1.0}
+    assert experiment.progress(clock, ["mass", "gravity", "speed"]) == [
+        "3 of 3",
+        "gravity",
+    ]  # while figures are drawn
+
+
+def test_the_line_of_progress_is_of_one_experiment_until_the_next_text_is_shown():
+    terminal, clock = Terminal(), SimpleNamespace(ended={}, under_way="mass")
+    terminal.show("kg m2", experiment.progress(clock, ["mass", "gravity"]))
+    clock.ended["mass"], clock.under_way = 0.5, "gravity"
+    assert terminal.line() == "1 of 2, mass: kg m2"
+    terminal.show("N m", experiment.progress(clock, ["mass", "gravity"]))
+    assert terminal.line() == "2 of 2, gravity: N m"
 
 
 class Writing(InProcess):
