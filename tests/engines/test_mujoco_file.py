@@ -269,8 +269,12 @@ def test_a_file_with_a_body_more_on_a_joint_than_the_solution_is_refused_with_bo
             engine(file, solution)
 
 
-def test_a_body_whose_joints_are_in_another_order_is_named_with_both_joints():
+def test_bodies_whose_joints_are_in_another_order_are_known_by_their_names():
     yaw, pitch = '<joint name="yaw" axis="0 0 1"/>', '<joint name="pitch" axis="0 1 0"/>'
-    text = f'<mujoco><worldbody><body name="a">{{}}{MASS}</body></worldbody></mujoco>'
-    with pytest.raises(ModelError, match="body a is on yaw, there on pitch"):
-        engine(read(text.format(pitch + yaw)), read(text.format(yaw + pitch)))
+    tip = f'<body name="{{}}"><joint name="tip" axis="1 0 0"/>{MASS}</body>'
+    text = f'<mujoco><worldbody><body name="a">{{}}{MASS}{tip}</body></worldbody></mujoco>'
+    orders = (pitch + yaw, "b"), (yaw + pitch, "b"), (yaw + pitch, "c")
+    here, there, other = (read(text.format(*parts)) for parts in orders)
+    assert [here.model.body(body).name for body in engine(here, there).bodies] == ["a", "b"]
+    with pytest.raises(ModelError, match="on joint yaw: 1, in the solution 0"):
+        engine(here, other)

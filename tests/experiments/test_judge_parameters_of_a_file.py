@@ -144,6 +144,14 @@ def test_a_small_body_beside_a_large_one_has_its_own_tolerance(tmp_path):
     assert failing(beside_solution(tmp_path, small, small)) == []
 
 
+def test_joints_that_follow_each_other_in_another_order_are_compared_by_their_names(tmp_path):
+    joints = '<joint name="yaw" axis="0 0 1"/>', '<joint name="pitch" axis="0 1 0"/>'
+    link = '<body name="b">{}{}<inertial pos="0 0 -0.5" mass="2" diaginertia="1 1 1"/></body>'
+    link = f"<mujoco><worldbody>{link}</worldbody></mujoco>"
+    result = beside_solution(tmp_path, link.format(*joints), link.format(*joints[::-1]))
+    assert {cause.place for cause in result.causes} == {"parent of yaw", "parent of pitch"}
+
+
 def small_link(com, quat, diagonal):
     return f'<body name="b"><joint name="j"/><inertial pos="{com}" quat="{quat}" mass="2" diaginertia="{diagonal}"/></body>'
 

@@ -177,19 +177,18 @@ def engine(reading: Reading, solution: Reading | None = None) -> Mujoco:
 
 
 def bodies_as_in(solution: Reading, reading: Reading) -> list[int]:
-    """The bodies of a file in the order of a solution's: on the same joint, by name or by order."""
+    """The bodies of a file in the order of a solution's: on the same joint, by name or by order.
+
+    Where joints follow each other in another order, bodies are on other joints, and are known by their names.
+    """
     numbers: dict[int, int] = {}
     for joint in solution.tree.joint_names:
         bodies, stated = moved_by(reading, joint), moved_by(solution, joint)
         if len(bodies) != len(stated):
+            named = dict(zip(reading.tree.body_names, reading.bodies))
+            if named.keys() == {*solution.tree.body_names}:
+                return [named[name] for name in solution.tree.body_names]
             counts = f"bodies with mass on joint {joint}: {len(bodies)}, in the solution {len(stated)}"
-            here, there = (
-                dict(zip(tree.body_names, (tree.joint_names[k] for k in tree.body_joint)))
-                for tree in (reading.tree, solution.tree)
-            )
-            moved = next((name for name in here if there.get(name, here[name]) != here[name]), "")
-            if moved:
-                counts += f"; body {moved} is on {here[moved]}, there on {there[moved]}"
             raise ModelError(f"cannot compare the bodies of {reading.source}: {counts}")
         order = stated if stated.keys() == bodies.keys() else bodies
         numbers |= zip(stated.values(), [bodies[name] for name in order])
