@@ -20,7 +20,7 @@ hinges and balls that turn the body, at least 1: each turn passes on the roundin
 its own. Where MuJoCo fuses bodies, one after another, each sum is turned into its principal axes and back: k
 is then multiplied by the number of bodies that are fused.
 
-A derivative by the movement of joint j changes at most four factors of a term, a lever and those of an
+A derivative by the tangent of joint j changes at most four factors of a term, a lever and those of an
 acceleration. A turn changes each by its own size: the scale of d(Mbar qdd + h)/dq_j is four times that of the
 terms of the bodies that j moves. A slide changes levers by 1 and accelerations by S^2.
 Where a system is solved, errors of eps in Mbar and in the forces are multiplied by |Mbar^-1|, entry by entry:
@@ -213,7 +213,7 @@ class Entries:
         return 2.0 * self.residual(force, np.broadcast_to(qdd, force.shape))
 
     def force_rates(self, qdd: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Of the derivatives of tau by movements of q and by qd, (states, nv, nv) each, at qdd."""
+        """Of the derivatives of tau by the tangent of q and by qd, (states, nv, nv) each, at qdd."""
         tree, sizes = self.tree, np.abs(np.broadcast_to(qdd, self.qd.shape))
         turning = sizes @ self.turns.T + self.spin**2  # (states, m)
         pushed = np.einsum("sbi,si->sb", self.t, sizes) + 2.0 * self.spin * self.speed
@@ -221,12 +221,12 @@ class Entries:
         moment = self.inertia * turning + self.mass * self.slip**2
         of_turn = np.einsum("sb,sbi->sbi", force, self.t) + moment[:, :, None] * self.turns
         of_slide = force[:, :, None] * self.turns + self.mass[:, None] * self.t * turning[:, :, None]
-        by_movement = 4.0 * (
+        by_tangent = 4.0 * (
             of_turn.transpose(0, 2, 1) @ self.turns + of_slide.transpose(0, 2, 1) @ self.slides
         )
         stiffness = np.diag(np.array(tree.stiffness)[self.of_speed]) + np.abs(tree.position_gain or 0.0)
         damping = np.diag(tree.damping) + np.abs(tree.speed_gain or 0.0)
-        return by_movement + stiffness, 2.0 * self.rates_by_speed + damping
+        return by_tangent + stiffness, 2.0 * self.rates_by_speed + damping
 
     def solved(self, right: np.ndarray, solution: np.ndarray) -> np.ndarray:
         """Of X with Mbar X = right, (states, nv, columns): |Mbar^-1| times the sizes of both sides."""
@@ -236,10 +236,10 @@ class Entries:
         """Of what tmt.derivatives returns at tau, where it is `by`; qdd: the accelerations."""
         force = self.force(tau) + gain_scale(self.tree, self.q, self.qd)
         sizes = np.abs(qdd) + self.acceleration(force, qdd)
-        by_movement, by_speed = self.force_rates(sizes)
+        by_tangent, by_speed = self.force_rates(sizes)
         unit_torques = np.broadcast_to(np.eye(self.qd.shape[1]), by.dqdd_dtau.shape)
-        by_q, by_qd, by_tau = map(self.solved, (by_movement, by_speed, unit_torques), by[:3])
-        return tmt.Derivatives(by_q, by_qd, by_tau, by_movement, by_speed)
+        by_q, by_qd, by_tau = map(self.solved, (by_tangent, by_speed, unit_torques), by[:3])
+        return tmt.Derivatives(by_q, by_qd, by_tau, by_tangent, by_speed)
 
     def step(self, dt: float | np.ndarray, by: tmt.Derivatives, scale: tmt.Derivatives) -> np.ndarray:
         """Of [A B] of a step, (states, 2 nv, 3 nv): dt times that of the derivatives, carried through it.

@@ -93,14 +93,14 @@ class Coordinates(NamedTuple):
         return tuple(names)
 
     def difference(self, q1: np.ndarray, q0: np.ndarray) -> np.ndarray:
-        """The movement from q0 to q1, (..., nv); for a ball the shortest rotation vector in its own axes."""
+        """The tangent vector from q0 to q1, (..., nv); for a ball the shortest rotation vector in its own axes."""
         if not self.has_balls:
             return np.subtract(q1, q0)
         end, start = (list(np.moveaxis(q, -1, 0)) for q in np.broadcast_arrays(q1, q0))
         return np.stack(self.places.difference(end, start), axis=-1)
 
     def move(self, q: np.ndarray, dv: np.ndarray) -> np.ndarray:
-        """The position after a movement, (..., nq)."""
+        """The position to which a tangent vector leads, (..., nq)."""
         if not self.has_balls:
             return np.add(q, dv)
         parts = np.broadcast_arrays(*np.moveaxis(q, -1, 0), *np.moveaxis(dv, -1, 0))

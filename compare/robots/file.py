@@ -111,8 +111,8 @@ def named_positions(file: RobotFile, names: Mapping[str, str]) -> dict[str, tupl
     postures |= dict(zip(OWN_POSTURES, (file.qpos0, middle)))
     positions: dict[str, tuple[float, ...]] = {}
     for name, q in postures.items():
-        movements = [coordinates.difference(q, np.array(other)) for other in positions.values()]
-        if all(np.abs(movement).max() >= SAME_POSTURE for movement in movements):
+        tangents = [coordinates.difference(q, np.array(other)) for other in positions.values()]
+        if all(np.abs(tangent).max() >= SAME_POSTURE for tangent in tangents):
             positions[name] = tuple(map(float, q))
     return positions
 

@@ -149,7 +149,7 @@ def test_differences_are_those_of_plain_steps_from_states_beside_one_or_two(inte
 
 @pytest.mark.parametrize("name", ["quadruped", "mixed"])
 def test_steps_from_states_beside_give_what_mjd_transition_fd_gives(name):
-    """With quaternions, contacts and speeds: movements are those from one end to the other, in the axes there."""
+    """With quaternions, contacts and speeds: tangents are those from one end to the other, in the axes there."""
     model, data = plain(name, 0.004, "Euler")
     start, A = state_of(model, data), np.zeros((2 * model.nv + model.na,) * 2)
     mujoco.mjd_transitionFD(model, data, 1e-6, True, A, None, None, None)

@@ -65,16 +65,16 @@ TABLE = f"""<mujoco><option timestep="0.002" integrator="implicitfast"/><worldbo
 
 
 def differences_of_six(model, state, eps):
-    """[A B] of order 6 by plain MuJoCo: columns by movements and speeds."""
+    """[A B] of order 6 by plain MuJoCo: columns by tangents and speeds."""
     data, spec = mujoco.MjData(model), mujoco.mjtState.mjSTATE_INTEGRATION
     start, columns = np.zeros(model.nq), []
 
     def after(k, by):
         mujoco.mj_setState(model, data, state, spec)
         start[:] = data.qpos
-        movement = by * np.eye(2 * model.nv)[k]
-        mujoco.mj_integratePos(model, data.qpos, movement[: model.nv], 1.0)
-        data.qvel += movement[model.nv :]
+        tangent = by * np.eye(2 * model.nv)[k]
+        mujoco.mj_integratePos(model, data.qpos, tangent[: model.nv], 1.0)
+        data.qvel += tangent[model.nv :]
         mujoco.mj_step(model, data)
         moved = np.zeros(model.nv)
         mujoco.mj_differentiatePos(model, moved, 1.0, start, data.qpos)

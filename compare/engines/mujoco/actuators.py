@@ -25,7 +25,7 @@ BESIDE = "actuator_delay", "actuator_damping", "actuator_dampingpoly"  # what a 
 AFFINE, CONSTANT = 1e-9, 1e-12  # relative to the largest force, and to the largest moment
 SOLVED, MOST_ITERATIONS = 1e-15, 100  # of the solver
 ACTING, IDLE = 0, 1  # groups of actuators
-WITHIN = (-0.7, 0.4)  # of the movement and of the speeds, at the fourth state
+WITHIN = (-0.7, 0.4)  # of the tangent and of the speeds, at the fourth state
 
 
 class Law(NamedTuple):
@@ -52,10 +52,10 @@ def law_at(model: mujoco.MjModel, q: np.ndarray, u: np.ndarray) -> Law:
     for i in range(count):
         set_control(m, i, float(u[i]), data.ctrl, data.act)
 
-    def forces(movement: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, ...]:
+    def forces(tangent: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, ...]:
         """Force, length, speed, (n,) each, and moment, (n, nv), at a moved posture."""
         data.qpos[:], moment = q, np.zeros((len(data.actuator_length), m.nv))
-        mujoco.mj_integratePos(m, data.qpos, movement, 1.0)
+        mujoco.mj_integratePos(m, data.qpos, tangent, 1.0)
         for part in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon, mujoco.mj_transmission):
             part(m, data)
         if data.actuator_moment.ndim == 2:
@@ -69,14 +69,14 @@ def law_at(model: mujoco.MjModel, q: np.ndarray, u: np.ndarray) -> Law:
         return tuple(value[outputs].copy() for value in values)
 
     still, rng = np.zeros(m.nv), np.random.default_rng(0)
-    movement, speeds = rng.uniform(0.5, 1.5, (2, m.nv))
+    tangent, speeds = rng.uniform(0.5, 1.5, (2, m.nv))
     force, length, _, moment = forces(still, still)
-    moved, other_length, _, other_moment = forces(movement, still)
+    moved, other_length, _, other_moment = forces(tangent, still)
     driven, _, speed, _ = forces(still, speeds)
     with np.errstate(all="ignore"):
         stiffness = np.nan_to_num((force - moved) / (other_length - length), posinf=0.0, neginf=0.0)
         damping = np.nan_to_num((force - driven) / speed, posinf=0.0, neginf=0.0)
-    last, last_length, last_speed, last_moment = forces(WITHIN[0] * movement, WITHIN[1] * speeds)
+    last, last_length, last_speed, last_moment = forces(WITHIN[0] * tangent, WITHIN[1] * speeds)
     by_law = force - stiffness * (last_length - length) - damping * last_speed
     largest = np.abs([force, moved, driven, last]).max(axis=0, initial=0.0)
     is_affine = np.abs(last - by_law) <= AFFINE * largest

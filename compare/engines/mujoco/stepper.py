@@ -202,7 +202,7 @@ class Stepper:
     ) -> tuple[Array, Array]:
         """A and B of a step: its derivatives by the deviation of the state, (n, n), and by inputs, (n, k).
 
-        A deviation is a movement of the positions (nv,), the speeds (nv,) and the activations (na,). by: ctrl
+        A deviation is a tangent vector of the positions (nv,), the speeds (nv,) and the activations (na,). by: ctrl
         (k = nu) or qfrc_applied (k = nv). eps: of the differences, rad, m, per s. They are those of MuJoCo's
         mjd_transitionFD where it is right, else of mj_step; at an end of the range of an activation or of a
         control they are one-sided.
@@ -239,8 +239,8 @@ class Stepper:
         by: a deviation, (2 nv + na,), which may be followed by a change of inputs, (nu,) or (nv,).
         """
         m, d = self.model, self.put(state)
-        movement, speed, activation, change = np.split(by, np.cumsum([m.nv, m.nv, m.na]))
-        mujoco.mj_integratePos(m, d.qpos, movement, 1.0)
+        tangent, speed, activation, change = np.split(by, np.cumsum([m.nv, m.nv, m.na]))
+        mujoco.mj_integratePos(m, d.qpos, tangent, 1.0)
         d.qvel += speed
         d.act += activation
         if len(change):
@@ -254,14 +254,14 @@ class Stepper:
         return data
 
     def deviation(self, one: Array, other: Array) -> Array:
-        """The deviation from one state to another: movement, speeds, activations, (2 nv + na,)."""
+        """The deviation from one state to another: tangent, speeds, activations, (2 nv + na,)."""
         q, v, act = (self.places[name] for name in ("qpos", "qvel", "act"))
-        movement = distance(self.model, one[q], other[q])
-        return np.concatenate([movement, other[v] - one[v], other[act] - one[act]])
+        tangent = distance(self.model, one[q], other[q])
+        return np.concatenate([tangent, other[v] - one[v], other[act] - one[act]])
 
 
 def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
-    """The movement from positions to others, (..., nq) each: (..., nv) rad or m, of a ball in its own axes."""
+    """The tangent vector from positions to others, (..., nq) each: (..., nv) rad or m, of a ball in its own axes."""
     pairs = np.broadcast_arrays(q0, q1)
     rows = [np.ascontiguousarray(q, float).reshape(-1, m.nq) for q in pairs]
     moved = np.zeros((len(rows[0]), m.nv))

@@ -19,7 +19,7 @@ DURATION, MOST_STEPS = 1.0, 5000  # s and steps, in which the state is looked fo
 AGREES = 0.01  # of the largest entry of a block: extrapolated derivatives that are the same
 FEWEST = 3  # neighbouring eps that have to agree
 GROWS = 1e-3  # an eigenvalue that is nearer to 1 is 1, as a double one is known to the root of an error
-SMALL = 1e-3  # of the speeds in a direction: movements that count
+SMALL = 1e-3  # of the speeds in a direction: tangents that count
 AXES = {"free": ("x", "y", "z", "turn x", "turn y", "turn z"), "ball": ("turn x", "turn y", "turn z")}
 
 
@@ -54,7 +54,7 @@ class Standing:
         self.stands = bool(self.acting) and least <= stillest
 
     def values(self, eps: float) -> Array:
-        """[A B] by movements, speeds, activations and controls, centred: (n, n + nu), n = 2 nv + na."""
+        """[A B] by tangents, speeds, activations and controls, centred: (n, n + nu), n = 2 nv + na."""
         return np.hstack(self.stepper.derivative(self.state, eps))
 
     def rows(self) -> tuple[list[ContactRow], Array | None]:

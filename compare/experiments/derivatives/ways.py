@@ -1,4 +1,4 @@
-"""A = dx+/dx and B = dx+/du of a step, x = (movement, speed): exact ones of tmt, MuJoCo's differences, their errors."""
+"""A = dx+/dx and B = dx+/du of a step, x = (tangent, speed): exact ones of tmt, MuJoCo's differences, their errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -68,7 +68,7 @@ def best_of(way: str, errors: Mapping[float, float | None]) -> WayRow:
 def worst_block(difference: Array, exact: Array, nv: int, least: Array | float = 0) -> tuple[float, str]:
     """The largest difference over the largest entry of its block, and that block, as dq/du.
 
-    Of [A B], (..., n, n + k), with nv movements and speeds, then activations. Blocks whose entries are no
+    Of [A B], (..., n, n + k), with nv tangents and speeds, then activations. Blocks whose entries are no
     larger than `least`, of each entry, are zero except for rounding, and left out. inf: a difference is not a
     number.
     """

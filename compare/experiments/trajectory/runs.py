@@ -81,10 +81,10 @@ def compare_scheme(
         return np.hstack([motion.q[:, 1], motion.v[:, 1]])
 
     def apart(states: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Absolute differences of movements, then of speeds: (states, 2 nv)."""
+        """Absolute differences of positions, as tangents, then of speeds: (states, 2 nv)."""
         nq = case.coordinates.nq
-        movements = case.coordinates.difference(states[:, :nq], others[:, :nq])
-        return np.abs(np.hstack([movements, states[:, nq:] - others[:, nq:]]))
+        tangents = case.coordinates.difference(states[:, :nq], others[:, :nq])
+        return np.abs(np.hstack([tangents, states[:, nq:] - others[:, nq:]]))
 
     q, v = run.q[::every][alive], run.v[::every][alive]
     stepped = one_step(first, scheme)

@@ -74,7 +74,7 @@ EDITS = (
     # of signs, of orders and runs, of what several numbers are, of derivatives, steps and energies
     ("judge.agree", "agree", "np.subtract(values, mujoco_values)", "np.subtract(np.abs(values), np.abs(mujoco_values))",
      "signs are not compared"),
-    ("judge.entries", "Entries.force_rates", "by_movement + stiffness", "10 * _0", "the scale of a derivative by q x 10"),
+    ("judge.entries", "Entries.force_rates", "by_tangent + stiffness", "10 * _0", "the scale of a derivative by q x 10"),
     ("judge.entries", "Entries.force_rates", "_1 + damping", "100 * _0", "the scale of a derivative by qd x 100"),
     ("judge.entries", "Entries.step", "carried + _1", "10 * _0", "the scale of a step x 10", 2),
     ("judge.entries", "Entries.step", "1.0", "0.0", "the small turn of a ball is judged as if no terms of 1 were added"),
