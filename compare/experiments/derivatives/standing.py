@@ -37,7 +37,7 @@ class ContactRow(Row):
 class Standing:
     """The state in the first second from the first posture in which a file accelerates least on contacts or limits.
 
-    stands: it accelerates no less at any state without them.
+    stands: at no state without them does it accelerate less.
     """
 
     def __init__(self, reading: Reading) -> None:

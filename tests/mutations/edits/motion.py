@@ -65,6 +65,7 @@ EDITS = (
     ("process.files", "why_not", "not has_mark(_1, _2)", "False", "any file is written to"),
     ("process.files", "has_mark", "mark.encode() in first", "True", "any comment is this program's"),
     ("source", "Source.files", "needed_by(self.origin)", "[self.origin]", "the model needs itself alone"),
+    ("mujoco.smaller", "limits", "model.jnt_range[joint.id]", "joint.range", "a range that is no limit stays in degrees"),
     ("mujoco.smaller", "finished", "data.qpos", "small.model.qpos0", "a smaller file starts at qpos0"),
     ("mujoco.smaller", "finished", "data.ctrl", "0.0 * data.ctrl", "a smaller file starts without controls"),
     ("mujoco.locked", "compiled_without", "smaller.jnt_stiffness[_1] = _2", "pass", "a springdamper is chosen anew"),
@@ -85,6 +86,7 @@ EDITS = (
     ("derivatives.standing", "errors_of", "_1 / 3.0", "0.0", "no term in eps^2 is taken away"),
     ("derivatives.standing", "errors_of", "finer[best + 1]", "finer[best]", "a derivative is its own truth"),
     ("derivatives.standing", "Standing.changed_by", "-np.eye(_1, _2)", "np.eye(_1, _2)", "contacts are looked at on one side"),
+    ("derivatives.standing", "Standing.__init__", "least <= stillest", "True", "what hits the floor stands on it"),
     ("derivatives.standing", "not_moved", "sizes <= least", "sizes <= 0.0", "no singular value is zero"),
     ("derivatives", "add_times", "1e6 * _1", "1e3 * _1", "a millisecond is called a microsecond"),
 )  # fmt: skip

@@ -26,6 +26,8 @@ EDITS = (
     ("parameters.causes", "causes_of", "number.place == first.place and _1", "_1", "all bodies are one cause"),
     ("parameters.causes", "SIX_DIGITS", "1e-5", "1.2e-5", "more than six digits are rounding"),
     ("parameters.causes", "causes_of", "relative(number) <= SIX_DIGITS", "False", "a saved file is wrong number by number"),
+    ("parameters.causes", "rotation_of", "SIX_DIGITS * _1", "1.2 * _0", "a rotation changes moments in the sixth digit"),
+    ("parameters.causes", "rotation_of", "min(_1, *_2)", "_1[0]", "an inertia is turned by any rotation"),
     ("parameters.numbers", "Compared.values", "(here, there)", "(there, here)", "the files are exchanged", 2),
     ("parameters", "beside_stated", "FACTOR * EPS * _1", "1e-3 * _1", "a number may be off by a thousandth"),
     ("parameters", "rows", "sorted(causes, key=_1)", "causes", "causes in the order of finding"),

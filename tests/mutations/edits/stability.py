@@ -35,6 +35,7 @@ EDITS = (
     ("stability.motion", "postures_of", "reading.keyframes", "list(reading.keyframes)[:6]", "six keyframes are postures"),
     ("stability.remedies", "shorter_steps", "verdict.holds", "True", "any shorter step makes a period stable"),
     ("stability.remedies", "confirmed", "borne and verdict.holds", "True", "no remedy is run"),
+    ("stability.answer", "row_of", "(row.stable_up_to_s or 0.0)", "pushed.longest", "an error allows steps that are not stable"),
     ("stability.answer", "limit_of", "max(1, round(_1))", "1", "every period is a step"),
     ("stability.answer", "worst_step", "row.integrator == row.file_integrator and _1", "_1",
      "any integrator's step is the file's"),
