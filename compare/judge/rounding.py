@@ -1,11 +1,15 @@
 """Bounds of the difference that rounding alone makes between two runs of the same method."""
 
+from typing import Any
+
 import numpy as np
 from numpy import ndarray
 
 from tmt import Tree, acceleration
+from tmt.derivation.form import COMPOSITE, Form
+from tmt.derivation.vectors import Rows, Values
 from tmt.literal import gather
-from tmt.methods import METHODS, Linearized, amplification
+from tmt.methods import METHODS, amplification
 from tmt.methods.derivatives import PART
 from tmt.methods.stepping import Method
 
@@ -22,6 +26,16 @@ OF_A_BALL = 32 * EPS
 LEFT_OUT = 3.2e-8
 
 
+class Seen(Form):
+    """It keeps the matrix of the linear system that it has solved last."""
+
+    matrix: Rows
+
+    def system(self, *of: Any) -> tuple[Rows, Values]:
+        self.matrix, force = super().system(*of)
+        return self.matrix, force
+
+
 def slope_rounding(
     stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float
 ) -> tuple[ndarray, ndarray, ndarray]:
@@ -32,10 +46,10 @@ def slope_rounding(
     factorization, where A is Mbar. Of `discrete` with servos it has the force that MuJoCo leaves out, where
     the force is as small as that, or nearly so.
     """
-    dynamics = Linearized()
+    dynamics = Seen(**vars(COMPOSITE))
     slope = stepping.slope(tree, list(q.T), list(qd.T), list(tau), dt, dynamics)
     a = np.stack([np.broadcast_to(component, q.shape[:1]) for component in slope], axis=-1)
-    A = gather(dynamics.last.matrix, q.shape[:1], overflow=np.nan)
+    A = gather(dynamics.matrix, q.shape[:1], overflow=np.nan)
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:
         force = force + gain_scale(tree, q, qd)

@@ -49,16 +49,23 @@ class Form:
                 force = minus(force, implicit.force)
                 armature = plus(armature, [row[i] for i, row in enumerate(implicit.matrix)])
             return self.by_bodies(tree, q, qd, force, armature)
+        matrix, force = self.system(tree, q, qd, tau, implicit)
+        return self.solve_any(matrix, force) if implicit else vectors.Factors(matrix).solve(force)
+
+    def system(
+        self, tree: Mechanism, q: Values, qd: Values, tau: Values, implicit: Implicit | None
+    ) -> tuple[Rows, Values]:
+        """The matrix of the linear system, and its right side."""
         M, h = self.terms(tree, q, qd)
         force = method.reduced_force(tree, h, q, qd, tau)
         if implicit is None:
-            return vectors.Factors(M).solve(force)
+            return M, force
         matrix = added(M, implicit.matrix)
         if implicit.bias_rows:
             rates = self.bias_rates(tree, q, qd)
             for i in implicit.bias_rows:
                 matrix[i] = plus(matrix[i], [implicit.dt * rate for rate in rates[i]])
-        return self.solve_any(matrix, minus(force, implicit.force))
+        return matrix, minus(force, implicit.force)
 
     def bias_rates(self, tree: Mechanism, q: Values, qd: Values) -> Rows:
         if self.rates is None:
