@@ -86,7 +86,7 @@ def gather(nested: Scalar, batch: tuple[int, ...], overflow: float | None = None
 
     def lists(item: Scalar) -> Scalar:
         if isinstance(item, (float, np.ndarray)):
-            return np.broadcast_to(item, batch) if batch else item
+            return item if np.shape(item) == batch else np.broadcast_to(item, batch)
         return [lists(part) for part in item]
 
     array = np.array(lists(nested), dtype=float)

@@ -16,7 +16,7 @@ from tmt.methods.stepping import Method
 from .entries import Entries
 from .scale import EPS, FACTOR, gain_scale, motion_scale
 
-SAMPLED = 16  # states of a block at which the bound of a step is computed
+SAMPLED = 4  # states of a block at which the Jacobian and the bound of a step are computed
 NARROW = 1e-3  # rad, m: a run is judged while the band of its positions is narrower
 # Rounding of a ball's turn in a step, a product of quaternions scaled to length 1: cosine and sine 1.5 eps,
 # four sums of four products 4 eps, division 0.5 eps: 6 eps of the quaternion, 12 of the turn, 24 for two
@@ -120,17 +120,22 @@ def band(
     blocks = (steps if most is None else min(steps, most)) // every
     if blocks <= 0:
         return widths
-    # the bound varies slowly: at fine steps it is computed at some states, and used for those that follow
+    # both vary slowly: at fine steps they are those of the middle of some steps, for all of these
     stride = max(1, every // SAMPLED)
     carried = np.empty((size, 0, size))  # [:, k]: the rounding of step k, propagated
     deltas = np.empty(0)
-    together = max(1, PART // (every * qd.shape[1]))  # blocks whose Jacobians are computed at once
+    # blocks whose Jacobians are computed at once
+    together = max(1, PART * stride // (every * qd.shape[1]))
     for first in range(0, blocks, together):
-        part = slice(first * every, min(first + together, blocks) * every)
-        jacobians = amplification(stepping, tree, q[part], qd[part], tau, dt).reshape(-1, every, size, size)
-        sampled = slice(part.start, part.stop, stride)
-        delta = step_rounding(stepping, tree, q[sampled], qd[sampled], tau, dt)
-        deltas = np.concatenate([deltas, np.repeat(delta, stride, axis=0).ravel()])
+        start, stop = first * every, min(first + together, blocks) * every
+        middles = np.minimum(np.arange(start, stop, stride) + stride // 2, stop - 1)
+        at = tree, q[middles], qd[middles], tau, dt
+        jacobians, delta = (
+            np.repeat(of_steps(stepping, *at), stride, axis=0)[: stop - start]
+            for of_steps in (amplification, step_rounding)
+        )
+        jacobians = jacobians.reshape(-1, every, size, size)
+        deltas = np.concatenate([deltas, delta.ravel()])
         to_end = np.empty_like(jacobians)  # [j, k]: from after step k of block j to the end of the block
         to_end[:, -1] = np.eye(size)
         for k in reversed(range(every - 1)):
