@@ -36,20 +36,26 @@ class Seen(Form):
         return self.matrix, force
 
 
-def slope_rounding(
+def accelerated(
     stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float
-) -> tuple[ndarray, ndarray, ndarray]:
-    """a, |a| and the bound of the rounding error of a, rad/s2, (states, nv) each, where A a = force.
+) -> tuple[ndarray, ndarray]:
+    """a (states, nv) and the matrix A (states, nv, nv) of the system A a = force."""
+    dynamics = Seen(**vars(COMPOSITE))
+    slope = stepping.slope(tree, list(q.T), list(qd.T), list(tau), dt, dynamics)
+    a = np.stack([np.broadcast_to(component, q.shape[:1]) for component in slope], axis=-1)
+    return a, gather(dynamics.matrix, q.shape[:1], overflow=np.nan)
 
-    The bound is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is
+
+def slope_rounding(
+    stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, a: ndarray, A: ndarray
+) -> ndarray:
+    """The bound of the rounding error of a, rad/s2, (states, nv), where A a = force.
+
+    It is |A^-1| (64 eps R |a| + 64 eps S), entry by entry, because entries have different units. S is
     the sum of the absolute terms of the force; R_ij = sqrt(A_ii A_jj) bounds the terms of A_ij and of its
     factorization, where A is Mbar. Of `discrete` with servos it has the force that MuJoCo leaves out, where
     the force is as small as that, or nearly so.
     """
-    dynamics = Seen(**vars(COMPOSITE))
-    slope = stepping.slope(tree, list(q.T), list(qd.T), list(tau), dt, dynamics)
-    a = np.stack([np.broadcast_to(component, q.shape[:1]) for component in slope], axis=-1)
-    A = gather(dynamics.matrix, q.shape[:1], overflow=np.nan)
     force = motion_scale(tree, q, qd) + Entries(tree, q).force(tau) + np.array(tree.damping) * np.abs(qd)
     if tree.has_gains:
         force = force + gain_scale(tree, q, qd)
@@ -59,7 +65,7 @@ def slope_rounding(
     if tree.has_gains and stepping == METHODS["discrete"]:
         total = np.einsum("sij,sj->si", A, a)
         errors = errors + LEFT_OUT * (np.linalg.norm(total, axis=1, keepdims=True) < 4.0 * LEFT_OUT)
-    return a, np.abs(a), np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
+    return np.einsum("sij,sj->si", np.abs(np.linalg.inv(A)), errors)
 
 
 def step_rounding(stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: ndarray, dt: float) -> ndarray:
@@ -69,15 +75,17 @@ def step_rounding(stepping: Method, tree: Tree, q: ndarray, qd: ndarray, tau: nd
     sum qd + dt a. Positions: the rounding of the sum q + dt qd plus dt x that of the speeds. The sums have at
     most 8 roundings in the two runs together; for a ball, OF_A_BALL replaces the rounding of q.
     """
-    stages = []
+    stages: list[tuple[ndarray, ...]] = []
 
     def slope(q: list[ndarray], qd: list[ndarray]) -> list[ndarray]:
-        a, *bounds = slope_rounding(stepping, tree, np.stack(q, axis=-1), np.stack(qd, axis=-1), tau, dt)
-        stages.append(bounds)
-        return list(a.T)
+        state = np.stack(q, axis=-1), np.stack(qd, axis=-1)
+        stages.append((*state, *accelerated(stepping, tree, *state, tau, dt)))
+        return list(stages[-1][2].T)
 
     stepping.step(slope, list(q.T), list(qd.T), dt, tree.coordinates)
-    size, rounding = np.max(stages, axis=0)
+    positions, speeds, a, A = map(np.concatenate, zip(*stages))  # of all stages at once
+    bounds = np.abs(a), slope_rounding(stepping, tree, positions, speeds, tau, a, A)
+    size, rounding = (bound.reshape(len(stages), *qd.shape).max(axis=0) for bound in bounds)
     rates = dt * rounding + 8 * EPS * (np.abs(qd) + dt * size)
     angles = 8 * EPS * (of_positions(tree, q) + dt * np.abs(qd)) + dt * rates
     return np.concatenate([angles, rates], axis=1)

@@ -11,7 +11,15 @@ import tmt
 from compare.engines.mujoco import engine, reading
 from compare.engines.mujoco.names import INTEGRATORS
 from compare.judge.entries import Entries
-from compare.judge.rounding import LEFT_OUT, OF_A_BALL, band, growth, slope_rounding, step_rounding
+from compare.judge.rounding import (
+    LEFT_OUT,
+    OF_A_BALL,
+    accelerated,
+    band,
+    growth,
+    slope_rounding,
+    step_rounding,
+)
 from compare.judge.scale import FACTOR, gain_scale
 from compare.robots.arm import ARM
 from compare.robots.file import robot_of
@@ -36,6 +44,12 @@ def turning(steps, dt, rate=5.0):
     return q[:, None], qd[:, None], 8 * EPS * (q + dt * qd) + dt * rates, rates
 
 
+def rounded(stepping, tree, q, qd, tau, dt):
+    """Accelerations and the bound of their rounding."""
+    a, A = accelerated(stepping, tree, q, qd, tau, dt)
+    return a, slope_rounding(stepping, tree, q, qd, tau, a, A)
+
+
 @pytest.mark.parametrize("name, share, left_out", [
     ("discrete", 0.99, True), ("discrete", 3.99, True), ("discrete", 4.01, False), ("implicitfast", 0.99, False),
 ])  # fmt: skip
@@ -46,7 +60,7 @@ def test_the_bound_of_discrete_with_servos_has_the_force_that_mujoco_leaves_out(
     found = reading.read(text)
     case = next(case for case in robot_of(found, "disc.xml").cases if case.controller)
     q = np.array([(case.tau - share * LEFT_OUT) / 50.0])  # the force is that share
-    a, _, bound = slope_rounding(METHODS[name], case.tree, q, 0.0 * q, case.tau, 1e-3)
+    a, bound = rounded(METHODS[name], case.tree, q, 0.0 * q, case.tau, 1e-3)
     assert bool(bound[0, 0] > LEFT_OUT / 2.1) is left_out
     if name in INTEGRATORS:
         qdd = engine(found).of(case).run(q[0], [0.0], case.tau, 1e-3, 1, name).v[1] / 1e-3
@@ -59,7 +73,8 @@ def test_what_a_controller_feeds_back_is_rounded_too():
     q, qd, M = np.array([[1.0], [-3.0]]), np.array([[5.0], [-2.0]]), 2.0
     fed = 50.0 * np.abs(q) + 4.0 * np.abs(qd)
     assert gain_scale(driven, q, qd) == pytest.approx(fed) and not gain_scale(TURN, q, qd).any()
-    _, size, bound = slope_rounding(METHODS["rk4"], driven, q, qd, TORQUE, 0.1)
+    a, bound = rounded(METHODS["rk4"], driven, q, qd, TORQUE, 0.1)
+    size = np.abs(a)
     assert size == pytest.approx(np.abs(3.0 - 50.0 * q - 4.0 * qd) / M)
     assert bound == pytest.approx(64 * EPS * (M * size + 3.0 + fed) / M, rel=1e-9, abs=0.0)
 
@@ -126,7 +141,7 @@ def test_roundings_of_two_joints_do_not_cancel_in_an_acceleration():
         one_body([UP] * 2, inertia=DISC, gravity=(0.0, 0.0, 0.0), armature=(2.0, 0.0)),
         np.array([3.0, 1.0]),
     )
-    a, _, bound = slope_rounding(METHODS["rk4"], discs, np.zeros((1, 2)), np.zeros((1, 2)), tau, 0.1)
+    a, bound = rounded(METHODS["rk4"], discs, np.zeros((1, 2)), np.zeros((1, 2)), tau, 0.1)
     assert a == pytest.approx(np.array([[1.0, -0.5]]))
     R = np.array([[4.0, 8.0**0.5], [8.0**0.5, 2.0]])
     errors = 64 * EPS * (R @ np.abs(a[0]) + tau)

@@ -74,30 +74,28 @@ class Linearized(Form):
     def change(
         self, tree: Mechanism, q: Values, qd: Values, tau: Values, implicit: Implicit | None
     ) -> Change:
-        a = super().acceleration(tree, q, qd, tau, implicit)
-        state = State(tree, {"q": q, "qd": qd, "qdd": a}, self)
-        matrix, (by_tangent, by_speed) = state.mass_matrix, state.torque_rates
-        if implicit:
-            matrix = added(matrix, implicit.matrix)
-        if implicit is None or implicit.acts_at_single_joints:
-            return Change(a, by_tangent, by_speed, matrix, Factors(matrix).solve)
-        if implicit.bias_rows:
+        matrix, force = self.system(tree, q, qd, tau, implicit)
+        is_symmetric = implicit is None or implicit.acts_at_single_joints
+        solve = Factors(matrix).solve if is_symmetric else partial(solve_any, matrix)
+        a = solve(force)
+        by_tangent, by_speed = State(tree, {"q": q, "qd": qd, "qdd": a}, self).torque_rates
+        if implicit and implicit.bias_rows:
             changes = self.changes_of_bias(tree, q, qd, a, implicit)
-            matrix, by_tangent, by_speed = map(added, (matrix, by_tangent, by_speed), changes)
-        return Change(a, by_tangent, by_speed, matrix, partial(solve_any, matrix))
+            by_tangent, by_speed = map(added, (by_tangent, by_speed), changes)
+        return Change(a, by_tangent, by_speed, matrix, solve)
 
     def changes_of_bias(
         self, tree: Mechanism, q: Values, qd: Values, a: Values, implicit: Implicit
     ) -> list[Rows]:
-        """dt dh/dqd in the implicit rows, and the derivatives of dt dh/dqd a by tangent vectors and by speeds."""
+        """The derivatives of dt dh/dqd a, of the implicit rows, by tangent vectors and by speeds."""
         rest, half = [0.0] * len(qd), [0.5] * len(qd)
         ahead, behind = (
             State(tree, {"q": q, "qd": speeds, "qdd": rest}, self).force_rates
             for speeds in (plus(qd, a), minus(qd, a))
         )
         dts = [implicit.dt if i in implicit.bias_rows else 0.0 for i in range(len(qd))]
-        changes = [scaled(half, [minus(*rows) for rows in zip(*pair)]) for pair in zip(ahead, behind)]
-        return [scaled(dts, rows) for rows in (self.bias_rates(tree, q, qd), *changes)]
+        pairs = zip(ahead, behind)
+        return [scaled(dts, scaled(half, [minus(*rows) for rows in zip(*pair)])) for pair in pairs]
 
 
 def one_step(
