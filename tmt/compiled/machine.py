@@ -9,7 +9,7 @@ from typing import Any
 import llvmlite
 import llvmlite.binding as llvm
 
-MUCH = 300_000  # characters of a module that is not optimised before it becomes machine code
+MUCH = 250_000  # characters of a module that is not optimised before it becomes machine code
 Function = Callable[..., Any]
 lock = Lock()  # LLVM's passes are not made for several threads at once
 
