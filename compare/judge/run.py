@@ -1,5 +1,7 @@
 """Properties of one run: how far it moved, when it left its start, when it diverged."""
 
+from functools import lru_cache
+
 import numpy as np
 
 import tmt
@@ -125,7 +127,8 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     """
     tree, coordinates = case.tree, case.coordinates
     exchange = 2.0 * gravity_scale(case.robot.tree, case.posture)  # the reach includes slides at the start
-    exchange = exchange + tmt.energy(tree, q[0], case.v) - tmt.potential_energy(tree, q[0])
+    kinetic, inertia = at_start(case)
+    exchange = exchange + kinetic
     if tree.position_gain:  # servos return energy until they exert no force; other torque is a motor's
         gain = np.array(tree.position_gain)
         pull, give = case.tau - fed_back_at(tree, q[0]), np.linalg.pinv(gain, hermitian=True)
@@ -138,8 +141,15 @@ def exchanged(case: Case, q: np.ndarray, done: np.ndarray) -> np.ndarray:
     weight = np.linalg.norm(tree.gravity) * np.sum(tree.mass)
     lifted = weight * np.abs(coordinates.difference(q, q[0])[:, slides]).sum(axis=1)
     stiff = np.sum(tree.stiffness) + (np.trace(tree.position_gain) if tree.position_gain else 0.0)
-    rounding = FACTOR * EPS * (np.trace(Entries(tree, q[:1]).mass_matrix[0]) + stiff)
+    rounding = FACTOR * EPS * (inertia + stiff)
     return np.maximum(exchange, np.maximum.accumulate(np.abs(done) + lifted)) + rounding
+
+
+@lru_cache(maxsize=8)  # a case has many runs
+def at_start(case: Case) -> tuple[float, float]:
+    """The kinetic energy of a case, J, and the sum of the inertias on the diagonal of Mbar, their scales."""
+    kinetic = tmt.energy(case.tree, case.q, case.v) - tmt.potential_energy(case.tree, case.q)
+    return float(kinetic), float(np.trace(Entries(case.tree, case.q[None]).mass_matrix[0]))
 
 
 def number_or_none(number: float | None) -> float | None:

@@ -6,6 +6,7 @@ tau, dt, out, count, of_q, of_qd, of_tau, of_dt): states one after the other, of
 next (0: the same for all); how often some were wrong.
 """
 
+from functools import lru_cache
 from itertools import accumulate
 
 from tmt.derivation.quantities import quantity_of
@@ -14,15 +15,20 @@ from tmt.model.values import CLOSE_TO_ONE
 
 from . import forms, linear
 from .ir import DOUBLE, INDEX, POINTER, Code, Value, Variable, module, wide
-from .straight import functions
+from .straight import Traced, functions
 
 INLINED = 600  # nodes that are put in the place of a call
 SHORTEST, LONGEST = (1.0 - CLOSE_TO_ONE) ** 2, (1.0 + CLOSE_TO_ONE) ** 2
 ARRAYS = ("q", "qd", "tau", "dt")
 
 
+@lru_cache(maxsize=1)  # for one state, for several side by side, and to count its operations
+def traced_quantity(tree: Tree, quantity: str) -> Traced:
+    return forms.quantity(tree, quantity)
+
+
 def source(tree: Tree, quantity: str, width: int) -> str:
-    traced, sizes = forms.quantity(tree, quantity), (tree.nq, tree.nv, tree.nv, 1)
+    traced, sizes = traced_quantity(tree, quantity), (tree.nq, tree.nv, tree.nv, 1)
     codes = functions(traced, width, inline=len(traced.nodes) <= INLINED)
     codes.append(rows(tree, quantity, sizes, len(traced.outputs), width))
     if width == 1:

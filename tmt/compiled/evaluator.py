@@ -110,9 +110,9 @@ class Evaluator:
     @cached_property
     def operations(self) -> int:
         """+ - * / and changes of sign of one evaluation; a sine, a cosine, a root count as one each."""
-        from . import forms
+        from . import entries
 
-        return forms.quantity(self.tree, self.quantity).operations
+        return entries.traced_quantity(self.tree, self.quantity).operations
 
 
 def rows_of(array: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:

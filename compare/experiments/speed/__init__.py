@@ -36,7 +36,9 @@ def begin(setup: Setup) -> Iterable[SceneRuns | NoReference]:
 
 def rows(setup: Setup, work: Iterable[SceneRuns | NoReference] | None = None) -> SpeedResult:
     """Errors, times, orders, the error of rounding, and the cheapest settings. A scene without reference is not judged."""
-    names, found = [case.name for case in setup.robot.cases], [*(begin(setup) if work is None else work)]
+    names, work = [case.name for case in setup.robot.cases], begin(setup) if work is None else work
+    loops = evaluations.loops(setup)  # compiled here while workers measure errors
+    found = [*work]
     known = [scene for scene in found if isinstance(scene, SceneRuns)]
     scenes = sorted(known, key=lambda scene: names.index(scene.case.name))
     without = [str(reason) for reason in found if isinstance(reason, NoReference)]
@@ -45,7 +47,6 @@ def rows(setup: Setup, work: Iterable[SceneRuns | NoReference] | None = None) ->
         for reason in without:
             result.not_judged("", "errors over time", reason)
         return result
-    loops = evaluations.loops(setup)
     setup.quiet()  # nothing else may run while times are taken
     for scene in scenes:
         setup.progress(f"speed: timing {scene.case.name}")

@@ -33,7 +33,7 @@ EDITS = (
     ("run", "LEFT", "0.1", "0.13", "an arm has left when it is 0.13 rad away"),
     ("run", "departure", "t[away][0]", "t[away][-1]", "the last time away is that of leaving"),
     ("run", "exchanged", "2.0 * gravity_scale(_1, _2)", "6.0 * gravity_scale(_1, _2)", "the bound of the energy x 3"),
-    ("run", "exchanged", "tmt.energy(tree, q[0], case.v)", "3 * _0", "the energy at the start x 3"),
+    ("run", "at_start", "tmt.energy(*_1)", "3 * _0", "the energy at the start x 3"),
     ("order", "ORDER_MARGIN", "0.15", "3", "orders may be off by 3"),
     ("run", "MOVES", "0.1", "0.001", "a run that hardly moves is enough"),
     ("trajectory", "check_divergence", "pair.band[_1] < NARROW", "False", "the step of divergence is never compared"),
