@@ -57,7 +57,10 @@ INERTIAL = """<body name="b"><frame pos="0.1 0.2 0.3" euler="10 20 30"><frame po
 <joint name="j" damping="2" stiffness="3"/>
 <inertial pos="0.2 0 0.1" mass="1" fullinertia="0.02 0.03 0.04 0.001 0.002 0.003"/></frame></frame></body>"""
 TURNED = pytest.mark.skipif(mujoco.mj_version() < 4_000_000, reason="MuJoCo 3.10 leaves out the rpy")
-SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf()]
+BASE = """<body name="base"><geom type="mesh" mesh="m" mass="0.7"/><body name="b"><joint name="j" damping="2" stiffness="3"/>
+<geom size="0.1" pos="0.2 0 0" mass="1"/></body></body>"""  # which does not move
+MESH = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+SOURCES = [PATHS["mixed"], mjcf(FRAMES, '<compiler eulerseq="zyx"/>'), mjcf(INERTIAL), mjcf(BASE, MESH), mjcf()]
 SOURCES += [pytest.param(URDF, marks=TURNED)]
 BODY = '<body name="b"><joint name="j"/><inertial pos="0.1 0 0" mass="1" diaginertia="{}"/>{}</body>'
 OPTIONS = {  # the quantities that it changes: of a file with these principal moments and something in its body

@@ -17,7 +17,7 @@ from ...core.finding import Finding
 from ...judge.scale import EPS, FACTOR
 from .dynamics import MujocoDynamics
 from .inventory import LEFT_OUT, OFF, OPEN, contact_pairs
-from .locked import compiled, is_from_geoms
+from .locked import compiled, is_from_geoms, moves
 from .names import aligns, element_name, joint_name, kind_of, matrix, moving, on, tensor
 from .reading import Reading
 from .source import Source, is_urdf
@@ -192,12 +192,13 @@ def stated_numbers(source: Source) -> list[Stated]:
 
 
 def left_to_compiler(source: Source) -> set[tuple[str, str]]:
-    """The numbers of bodies without an inertial; not their mass, if all of their geoms state theirs."""
+    """The numbers of bodies without an inertial; not the mass of one that moves, if all of its geoms state theirs."""
     left = set()
     for body, number in zip(source.spec.bodies[1:], source.bodies[1:]) if source.spec else ():
         low, high = body.compiler.inertiagrouprange
         masses = [geom.mass for geom in body.geoms if low <= geom.group <= high]
-        quantities = FROM_INERTIAL[bool(masses) and bool(np.isfinite(masses).all()) :]
+        has_mass = bool(masses) and bool(np.isfinite(masses).all()) and moves(body)
+        quantities = FROM_INERTIAL[has_mass:]
         if not body.explicitinertial:
             left |= {(element_name(source.model, "body", number), quantity) for quantity in quantities}
     return left
