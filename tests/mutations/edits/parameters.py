@@ -35,7 +35,7 @@ EDITS = (
     ("mujoco.reading", "read", "(_1 > 0.0) | _2", "(_1 > 0.0) & _2", "a point mass is no body"),
     ("mujoco.parameters", "stated_numbers", "stated[key] -= trace * np.eye(3)", "pass", "tensors have their trace more"),
     ("mujoco.parameters", "left_to_compiler", "not body.explicitinertial", "False", "what geoms give is stated"),
-    ("mujoco.parameters", "left_to_compiler", "moves(body)", "True", "meshes that are left out of what stands still had the mass"),
+    ("mujoco.parameters", "left_to_compiler", "moves(body)", "True", "meshes of what stands still had the mass"),
     ("mujoco.reading", "bodies_as_in", "len(bodies) != len(stated)", "False", "a body more is no difference"),
     ("mujoco.reading", "tree_of", "model.qpos0[_1] if has_reference else 0.0", "0.0", "a joint's ref is zero"),
     ("mujoco.source", "leave_out", "filter(gives_inertia, geoms)", "()", "a missing mesh has no mass"),
