@@ -192,7 +192,7 @@ def stated_numbers(source: Source) -> list[Stated]:
 
 
 def left_to_compiler(source: Source) -> set[tuple[str, str]]:
-    """The numbers of bodies without an inertial; not the mass of one that moves, if all of its geoms state theirs."""
+    """The numbers of bodies without an inertial; not the mass of what moves, if all of its geoms state theirs."""
     left = set()
     for body, number in zip(source.spec.bodies[1:], source.bodies[1:]) if source.spec else ():
         low, high = body.compiler.inertiagrouprange
