@@ -62,6 +62,14 @@ def test_what_is_fixed_to_the_world_or_to_a_mocap_body_is_no_part_of_the_centre_
     assert np.allclose(dynamics.centroidal_momentum_matrix(q) @ v, expected, atol=1e-12)
 
 
+def test_momentum_of_bodies_high_above_the_world_is_rounded_by_what_is_between_them():
+    """Three in a row: the one in the middle is at the common centre of mass, and has none by its speeds along axes."""
+    body = '<body pos="{} -0.4 10.1"><freejoint/><geom size=".1" mass="14"/></body>'
+    found = read(f"<mujoco><worldbody>{''.join(map(body.format, (0.6, 0.0, 0.3)))}</worldbody></mujoco>")
+    momentum = engine(found).of(robot_of(found, "a row").case()).centroidal_momentum_matrix(found.qpos0)
+    assert np.abs(momentum[3:, 12:15]).max() < 1e-15 and momentum[5, 1] == pytest.approx(14 * 0.3, abs=1e-14)
+
+
 @pytest.mark.skipif(runs.library() is None, reason="MuJoCo's library is elsewhere")
 def test_a_loop_repeats_its_calls_at_a_state(mujoco, rng):
     dynamics, nothing = mujoco.of(ARM.case()), np.zeros(3)

@@ -24,8 +24,13 @@ class Whole:
         self.shares = self.masses / self.total
 
     def com(self, d: mujoco.MjData) -> np.ndarray:
-        at_rest = self.model.body_mass[self.still] @ d.xipos[self.still] / self.total
-        return self.shares @ d.subtree_com[self.trees] + at_rest
+        return d.subtree_com[self.trees[0]] + self.from_first(d)[1]
+
+    def from_first(self, d: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+        """Centres of mass from that of the first tree: of all trees, (trees, 3), and the common one, (3,)."""
+        places = d.subtree_com[self.trees], d.xipos[self.still]
+        trees, still = (place - d.subtree_com[self.trees[0]] for place in places)
+        return trees, self.shares @ trees + self.model.body_mass[self.still] @ still / self.total
 
     def com_jacobian(self, d: mujoco.MjData) -> np.ndarray:
         """(3, nv)."""
@@ -34,7 +39,8 @@ class Whole:
     def momentum(self, d: mujoco.MjData) -> np.ndarray:
         """Linear, and angular about the common centre of mass, for unit speeds, (6, nv)."""
         linear = self.masses[:, None, None] * self.of_trees(mujoco.mj_jacSubtreeCom, d)
-        arms = d.subtree_com[self.trees] - self.com(d)
+        trees, middle = self.from_first(d)
+        arms = trees - middle
         angular = self.of_trees(mujoco.mj_angmomMat, d) + np.cross(arms[:, :, None], linear, axis=1)
         return np.concatenate([linear.sum(axis=0), angular.sum(axis=0)])
 
