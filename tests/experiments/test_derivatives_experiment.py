@@ -109,6 +109,15 @@ def test_a_robot_with_motors_alone_is_set_going_and_moved_by_its_controls():
     assert 1e-6 < best.eps < 1e-2 and best.error < 1e-7
 
 
+def test_a_robot_too_stiff_for_explicit_methods_is_followed_to_its_end(monkeypatch):
+    monkeypatch.setattr("tmt.compiled.runner.MOST_EVALUATIONS", 10_000)  # 1e8 take minutes
+    setup = setup_of_file(MOTORS.replace('name="hip"', 'name="hip" damping="1e11"'))
+    case = ways.case_of(setup.robot)
+    subject = ways.Subject(setup.engines["mujoco"], case, 0.002, "Euler", 3)
+    motion = tmt.simulate(case.tree, *case.start, case.tau, case.scene.dt, case.steps, "implicitfast")
+    assert subject.q[-1] == pytest.approx(motion.q[-1], abs=1e-12) and abs(motion.q[-1, 1] - case.q[1]) > 0.1
+
+
 @pytest.mark.parametrize("integrator", ["Euler", "RK4", "implicit", "implicitfast"])
 @pytest.mark.parametrize("more, inputs", [('<motor joint="knee" gear="2"/>', [1]), ("", [])])
 def test_the_control_of_a_damper_changes_damping_and_is_no_input(integrator, more, inputs):
