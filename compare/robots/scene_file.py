@@ -3,7 +3,7 @@
 import csv
 import json
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -71,11 +71,6 @@ def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict
     for number, name in enumerate(names):
         if name in names[:number]:
             raise SceneError(f"{path}: the column {shown(name)} is there twice")
-        if name not in ("time", *actuators):
-            known = f"time and {', '.join(actuators)}"
-            raise SceneError(f"{path}: there is no actuator {name}; expected {known}")
-    if "time" not in names or len(names) < 2 or not rows:
-        raise SceneError(f"{path}: expected a column time, one of at least one actuator, and rows of numbers")
     table = np.full((len(rows), len(names)), np.nan)
     for number, row in enumerate(rows):
         if len(row) != len(names):
@@ -83,21 +78,39 @@ def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict
         for column, cell in enumerate(row):
             with suppress(ValueError):
                 table[number, column] = float(cell)
-    for number, column in np.argwhere(~np.isfinite(table)).tolist()[:1]:
-        cell = shown(rows[number][column])
-        raise SceneError(f"{path}, row {number + 1}: {names[column]} is {cell}; expected a number")
-    columns = dict(zip(names, table.T))
-    times = columns["time"]
+    check_controls(path, dict(zip(names, table.T)), actuators, dt, dict(zip(names, zip(*rows))))
+    return dict(zip(names, table.T))
+
+
+def check_controls(
+    where: str | Path, columns: Mapping[str, np.ndarray], actuators: Sequence[str], dt: float,
+    cells: Mapping[str, Sequence[object]],
+) -> None:  # fmt: skip
+    """SceneError, as of read_controls, for columns that are no controls. cells: as they were given."""
+    for name in columns:
+        if name not in ("time", *actuators):
+            known = f"expected time and {', '.join(actuators)}" if actuators else "the file has none"
+            raise SceneError(f"{where}: there is no actuator {name}; {known}")
+    times = columns.get("time", np.zeros(0))
+    if len(columns) < 2 or not len(times):
+        raise SceneError(
+            f"{where}: expected a column time, one of at least one actuator, and rows of numbers"
+        )
+    for name, values in columns.items():
+        if values.shape != times.shape or times.ndim != 1:
+            raise SceneError(f"{where}: {name} has the shape {values.shape}, time {times.shape}")
+        for number in np.flatnonzero(~np.isfinite(values)).tolist()[:1]:
+            cell = shown(cells[name][number])
+            raise SceneError(f"{where}, row {number + 1}: {name} is {cell}; expected a number")
     if times[0] != 0.0 or len(times) < 2:
         begins = f"time begins at {times[0]:g}, {len(times)} rows"
-        raise SceneError(f"{path}: {begins}; expected two rows at least, from 0 on")
+        raise SceneError(f"{where}: {begins}; expected two rows at least, from 0 on")
     for k in np.flatnonzero(np.diff(times) <= 0.0).tolist()[:1]:
         falls = f"{times[k + 1]:g} after {times[k]:g} s"
-        raise SceneError(f"{path}, row {k + 2}: time does not rise ({falls})")
+        raise SceneError(f"{where}, row {k + 2}: time does not rise ({falls})")
     if times[-1] / dt > MOST_STEPS:
         steps = f"{times[-1] / dt:.2g} steps of {1e3 * dt:g} ms; expected {MOST_STEPS} at most"
-        raise SceneError(f"{path}: time ends at {times[-1]:g} s, which are {steps}")
-    return columns
+        raise SceneError(f"{where}: time ends at {times[-1]:g} s, which are {steps}")
 
 
 def regular(path: str | Path) -> str:

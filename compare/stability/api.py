@@ -13,6 +13,8 @@ from ..core.finding import Finding
 from ..core.text import screen
 from ..engines.mujoco.names import INTEGRATORS, integrator_by_name
 from ..engines.mujoco.reading import read
+from ..robots.scene import is_number
+from ..robots.scene_file import check_controls, read_controls
 from .answer import Question, StepLimitRow, answer
 from .motion import posture_of, postures_of
 
@@ -95,7 +97,8 @@ def step_limits(
     Raises
     ------
     ValueError
-        If MuJoCo makes no model of it, nothing moves, or for an unknown posture, integrator or actuator.
+        If MuJoCo makes no model of it, nothing moves, for an unknown posture, integrator or actuator, or a
+        number that is none or that nothing takes.
 
     Examples
     --------
@@ -111,15 +114,20 @@ def step_limits(
         raise ValueError(f"expected a sequence of names; not {integrators!r}")
     numbers = {"push": push, "error": error, "control_period": control_period}
     for name, number in numbers.items():
-        if number is not None and not 0.0 < number < np.inf:
-            raise ValueError(f"{name} is {number}: expected a number above 0")
+        if number is not None and not (is_number(number) and number > 0.0):
+            raise ValueError(f"{name} is {number!r}: expected a number above 0")
+    of_program = {"delay": delay, "kp": kp, "kv": kv}
+    for name, number in of_program.items():
+        if number is not None and control_period is None:
+            raise ValueError(f"{name} is of a program with a control_period")
+        if number is not None and not (is_number(number) and number >= 0.0):
+            raise ValueError(f"{name} is {number!r}: expected a number from 0 on")
     recorded: Mapping[str, Any] | None = None
+    names = reading.drive.names if reading.drive else ()
     if isinstance(controls, Mapping):
-        recorded = {name: np.asarray(values, float) for name, values in controls.items()}
+        recorded = {name: np.atleast_1d(np.asarray(values, float)) for name, values in controls.items()}
+        check_controls("controls", recorded, names, reading.dt, recorded)
     elif controls is not None:
-        from ..robots.scene_file import read_controls
-
-        names = reading.drive.names if reading.drive else ()
         recorded = read_controls(str(controls), names, reading.dt)
     question = Question(
         reading.dt, reading.integrator, [integrator_by_name(name) for name in integrators or INTEGRATORS],

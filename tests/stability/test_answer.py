@@ -182,6 +182,11 @@ def test_the_object_is_a_table_a_sequence_and_a_frame():
 @pytest.mark.parametrize("more, named", [
     ({"push": 0.0}, "push"), ({"push": float("nan")}, "push"), ({"integrators": "Euler"}, "sequence"),
     ({"integrators": ["euler"]}, "Euler"), ({"posture": "none"}, "qpos0"), ({"control_period": -1.0}, "control_period"),
+    ({"push": "0.1"}, "push is '0.1': expected a number above 0"), ({"delay": 0.05}, "delay is of a program"),
+    ({"kv": 1.0}, "kv is of a program"), ({"delay": -0.1, "control_period": 0.01}, "delay is -0.1"),
+    ({"controls": {"time": [0.0, 1.0], "none": [0.0, 1.0]}}, "no actuator none"),
+    ({"controls": {"time": [0.0, 1.0], "servo": [0.0]}}, "servo has the shape"),
+    ({"controls": {"time": [0.0, 1.0], "servo": [0.0, np.nan]}}, "row 2: servo is NaN"),
 ])  # fmt: skip
 def test_what_is_mistaken_is_one_line(more, named):
     with pytest.raises(ValueError, match=named) as error:
