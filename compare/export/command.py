@@ -17,8 +17,9 @@ from tmt.export.parameters import Parameters
 
 from ..cli.command_line import EQUATIONS, command_parser
 from ..core.errors import Refused
+from ..core.finding import Finding
 from ..core.options import Option, expected, seconds
-from ..core.text import block
+from ..core.text import block, screen
 from ..core.words import in_one_line
 from ..report.provenance import installed
 from ..report.terminal import Terminal
@@ -123,7 +124,9 @@ def write_equations(options: argparse.Namespace, command: str) -> int:
             path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise Refused(f"cannot write to {options.out}: {error.strerror}") from None
-    terminal.say_lines(block("export", "table", outcome=outcome, times=times).splitlines())
+    tables = {"differences": outcome.rows, "times": times}
+    for table in [Finding("export", kind, {"rows": rows}) for kind, rows in tables.items() if rows]:
+        terminal.say_lines(screen(table))
     style = "bold green" if outcome.passed else "bold" if outcome.not_run else "bold red"
     terminal.say(block("export", "verdict", outcome=outcome, states=STATES), style)
     terminal.say(block("export", "files", paths=paths, seconds=time.perf_counter() - started))
