@@ -16,7 +16,7 @@ from ..diagnosis import STATES_ASKED, Diagnosis, Stated, Values, diagnose
 from ..diagnosis.cause import LEAST_STATES
 from ..diagnosis.consistency import conditions, symmetric
 from ..diagnosis.forces import LeftOver
-from ..diagnosis.layout import ROUNDED
+from ..diagnosis.layout import ROUNDED, Entry
 from ..diagnosis.regression import through_noise
 from ..engines.own import QUICK, OwnEquations
 from ..robots.coordinates import Coordinates
@@ -76,6 +76,8 @@ class Given(NamedTuple):
 
 def why(given: Given) -> Why:
     """What explains values: of Mbar and h, and of accelerations beside them; of accelerations alone where these agree."""
+    if holes := without_numbers(given):  # what the other entries have in common may be chance
+        return Why(say(Finding("agreement", "holes", {"entries": holes})), False)
     are_given = bool(np.isfinite(given.values.packed).any())
     found = of_equations(given) if are_given else Why("", False)
     if given.qdd is not None and not found.diagnosis.differs:
@@ -88,6 +90,16 @@ def why(given: Given) -> Why:
     text = left_over.sentence() or say(Finding("agreement", "another"))
     both = f"{found.text} {text}" if found.is_found else found.text
     return found._replace(text=both, forces=left_over.causes, force_text=text, force_ratio=left_over.ratio)
+
+
+def without_numbers(given: Given) -> list[str]:
+    """The entries of a given Mbar or h that are finite at no state, "h[hip]"."""
+    names, holes = Coordinates(given.tree.joint_names, given.tree.kind).speeds, list[str]()
+    for kind, values in (("M", given.values.mass_matrix), ("h", given.values.bias)):
+        known = np.isfinite(values).any(axis=0)
+        missing = np.argwhere(~known & known.any()).tolist()
+        holes += [Entry(kind, tuple(at)).named(names) for at in missing]
+    return holes
 
 
 def of_equations(given: Given) -> Why:

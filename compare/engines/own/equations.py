@@ -156,23 +156,25 @@ class OwnEquations:
 
         OwnError if it raises where it is called for the first time.
         """
-        values, bad = dict[int, ndarray](), np.zeros(len(states[0]), bool)
+        values, bad, count = dict[int, ndarray](), dict[str, ndarray](), len(states[0])
         for i, state in enumerate(zip(*states)):
             key = name, *(part.tobytes() for part in state)
             try:
                 if key not in self.known:
                     self.known[key] = self.called(name, state)
                 values[i] = self.known[key]
-                bad[i] = not np.isfinite(values[i]).all()
+                if not np.isfinite(values[i]).all():
+                    bad.setdefault(not_finite(name, values[i]), np.zeros(count, bool))[i] = True
             except OwnError as error:
                 if name not in self.times:
                     raise OwnError(f"{error}, at {state_in_words(state)}") from error
-                self.note(name, str(error), states, np.arange(len(bad)) == i)
-        self.note(name, "is not finite", states, bad)
+                self.note(name, str(error), states, np.arange(count) == i)
+        for what, where in bad.items():
+            self.note(name, what, states, where)
         if len(self.known) > MOST_KNOWN:
             self.known.clear()
         of_one = [axis if isinstance(axis, int) else 0 for axis in self.shapes[name]]
-        together = np.full((len(bad), *of_one), np.nan)
+        together = np.full((count, *of_one), np.nan)
         for i, value in values.items():
             together[i] = value
         return together
@@ -206,6 +208,13 @@ class OwnEquations:
             problem = self.errors.setdefault((name, what), Problem(name, text, first, set()))
             rows = np.concatenate([part[where] for part in states], axis=1)
             problem.states.update(hash(row.tobytes()) for row in rows)
+
+
+def not_finite(name: str, value: ndarray) -> str:
+    """What is said of a value with entries that are not finite: the first of them, if it is not all."""
+    where = ~np.isfinite(value)
+    first = "".join(f"[{k}]" for k in np.argwhere(where)[0].tolist())
+    return "is not finite" if where.all() else f"{name}{first} is not finite"
 
 
 def passive(tree: tmt.Tree, q: ndarray, v: ndarray) -> ndarray:

@@ -73,7 +73,7 @@ EDITS = (
     ("source", "Source.bare", "self.spec.compiler.settotalmass > 0.0", "False", "a total mass without meshes"),
     ("inventory", "usable_keys", "np.hstack(_1)", "m.key_qpos", "a keyframe may have infinite controls"),
     ("inventory", "contact_pairs", "[chosen, _1]", "[chosen]", "pairs that a file names do not touch"),
-    ("scene_file", "read_controls", "np.diff(times) <= 0.0", "np.diff(times) < 0.0", "times of controls may stand"),
+    ("scene_file", "check_controls", "np.diff(times) <= 0.0", "np.diff(times) < 0.0", "times of controls may stand"),
     # derivatives
     ("derivatives.ways", "Subject.share_of_differences", "FACTOR * EPS * sizes / eps", "30 * _0", "rounding of differences x 30"),
     ("derivatives.ways", "Subject.share_of_differences", "np.fmax(*terms)", "terms[0]", "one eps tells the truncation"),
