@@ -21,6 +21,24 @@ EXAMPLES = block(TEXT, "examples")
 MAY_BE_NEGATIVE = "--joints", "--posture"  # their values may begin with a minus
 
 
+class Once(argparse.Action):
+    """Keeps the value of an option; an error if there is one already."""
+
+    is_stated = False
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: Any,
+        _: str | None = None,
+    ) -> None:
+        if self.is_stated:
+            parser.error(f"{self.option_strings[0]} is stated twice")
+        self.is_stated = True
+        setattr(namespace, self.dest, values)
+
+
 class Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, and whose help has no line too wide."""
 
@@ -34,7 +52,12 @@ class Parser(argparse.ArgumentParser):
         """Add an option; its help is the macro of its name, or the one that it names."""
         values: dict[str, Any] = {"action": "store_true"}
         if option.type:
-            values = {"type": option.type, "metavar": option.metavar, "default": option.default}
+            values = {
+                "type": option.type,
+                "metavar": option.metavar,
+                "default": option.default,
+                "action": Once,
+            }
         text = block(template, option.text or name_of(word))
         self.add_argument(word, help=" ".join(text.split()), **values)
 

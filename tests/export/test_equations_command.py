@@ -142,7 +142,8 @@ def test_a_text_that_does_not_compile_has_failed(tmp_path):
 
 
 @pytest.mark.parametrize(("words", "why"), [
-    ("--to fortran --out new", "fortran"), ("--to pyton --out new", "did you mean python"), ("--name 2nd --out new", "2nd"),
+    ("--to fortran --out new", "fortran"), ("--to c --to c --out new", "--to is stated twice"),
+    ("--to pyton --out new", "did you mean python"), ("--name 2nd --out new", "2nd"),
     ("--name double --out new", "double"), ("--name bias --out new", "bias"), ("--quantity mass --out new", "mass"),
     ("--quantity frame_pose:nose --out new", "nose"), ("--out file/below", "file is not a folder"),
     ("--to python --float --out new", "single precision"), ("--out .", "exists"), ("", "--out"), ("--outt x", "--outt"),

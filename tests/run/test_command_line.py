@@ -179,6 +179,7 @@ WRONG = {
     "mass -quick": "did you mean --quick?", "mass --xyz": "--reference --joints", "mass gravity": "'gravity'",
     "--mjcf robot.xml": "all --mjcf robot.xml", "mass --reference modle": "did you mean model?",
     "--quick fleet x": "fleet must come first", "mass --reference my.py": "no such file",
+    "mass --mjcf arm.xml --mjcf=other.xml": "--mjcf is stated twice",
     "mass --out": "--out: expected one argument", "mass --mjcf=": "--mjcf: the name is empty",
     "stability --dt nan": "'nan'", "stability --dt=-0.5": "'-0.5'", "MASS": "did you mean mass?",
     "stability --dt 5.1": "'5.1'", "stability --dt 9e-7": "'9e-7'", "mass --scenes my.toml": "mass",
