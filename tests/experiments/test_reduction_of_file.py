@@ -86,7 +86,7 @@ def test_the_idle_arm_is_locked_and_the_written_file_does_the_same_motion(two_ar
     assert "home" in text and "run, error 0.001" in text and "right upper" in text  # the comment
     assert len(lines) <= 12 and "2 of 4 joints, and 20 elements" in lines[0]
     assert any("the same bits for 0.4 s" in line for line in lines)
-    assert "3 actuators, right lower, right upper and unused." in lines[-1] and str(path) in lines[-1]
+    assert "3 actuators (right upper, right lower and unused)." in lines[-1] and str(path) in lines[-1]
 
 
 SCENES = """[[scene]]

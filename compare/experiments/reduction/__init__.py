@@ -122,9 +122,8 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     setup.quiet()
     models = timed_models(scene, locks, sum(row.taken_out for row in free if row.same_bits))
     models[-1].error = error
-    actuators = {each.name for each in scene.whole.spec.actuators} - {
-        each.name for each in model.spec.actuators
-    }
+    kept = {each.name for each in model.spec.actuators}
+    actuators = [each.name for each in scene.whole.spec.actuators if each.name not in kept]
     result.tables |= {"reduction_models": models, "reduction_free": free, "reduction_joints": locks.rows}
     used = scene.use.parts(scene.whole.model).items()
     result.tables["reduction_use"] = [
@@ -132,7 +131,7 @@ def add_file(result: Result, setup: Setup, reading: Reading) -> None:
     ]
     result.top.append(result.finding(
         "answer", about=made, unit=movement_unit(coordinates_of(scene)), names=names, moved=scene.use.moved,
-        models=models, free=[row for row in free if row.same_bits], actuators=sorted(actuators), error=error,
+        models=models, free=[row for row in free if row.same_bits], actuators=actuators, error=error,
         written=shown_path(write) if write and is_written else "", refused=write and not is_written,
         assets=assets_of(draft).name if files_of(model.spec) else "",
     ))  # fmt: skip
