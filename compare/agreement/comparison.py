@@ -8,8 +8,6 @@ import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from itertools import product
-from os import PathLike
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -41,12 +39,6 @@ DEFAULT_STATES = 100
 OWN_SECONDS = 20.0  # s for the user's functions at random states
 
 
-def origin_of(mjcf: Any) -> Any:
-    """What a user gives as a model: a path as a Path, MJCF text and models as they are."""
-    is_path = isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<")
-    return Path(mjcf) if is_path else mjcf
-
-
 class Comparison:
     """A user's quantities and MuJoCo's at the same states; the arguments are those of `assert_agrees`.
 
@@ -60,6 +52,7 @@ class Comparison:
         joints: Sequence[str] | None, rtol: float, states: int, seed: int,
     ) -> None:  # fmt: skip
         from ..engines.mujoco import engine, read, tree_with_sites  # here: `import compare` need not wait
+        from ..engines.mujoco.reading import origin_of
 
         self.brought = {name: value for name, value in quantities.items() if value is not None}
         if not self.brought:

@@ -10,7 +10,6 @@ import tmt
 
 from ..core.finding import Finding
 from ..core.text import say
-from .comparison import origin_of
 
 
 def tree(mjcf: str | PathLike[str] | Any, *, floating: bool = False) -> tmt.Tree:
@@ -46,6 +45,7 @@ def tree(mjcf: str | PathLike[str] | Any, *, floating: bool = False) -> tmt.Tree
     """
     from ..engines.mujoco import Source, read, tree_with_sites  # here: `import compare` need not wait for it
     from ..engines.mujoco.parameters import of_source
+    from ..engines.mujoco.reading import origin_of
 
     reading = read(Source(origin_of(mjcf), floating))
     for finding in of_source(reading.source):

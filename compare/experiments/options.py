@@ -30,6 +30,10 @@ def stated_reference(text: str) -> str:
     """What a model is compared with; a text with a colon is read later. FILE.py is all of the file, as FILE.py:."""
     if text.endswith(".py"):
         return f"{text}:"
+    file = text.rpartition(":")[0]
+    if file.lower().endswith(SOLUTIONS):
+        why = f"{text!r}: the file of a robot takes no name after a colon; expected {file}"
+        raise argparse.ArgumentTypeError(why)
     if text in ("arm", "model") or ":" in text or text.lower().endswith(SOLUTIONS):
         return text
     choices = "arm, model, FILE.xml or .urdf, FILE.py, FILE.py:OBJECT or MODULE:OBJECT"
@@ -37,6 +41,18 @@ def stated_reference(text: str) -> str:
         choices += "; a table of values is compared in Python, see help(compare.assert_agrees)"
     hint = expected(text, ("arm", "model"), choices)
     raise argparse.ArgumentTypeError(f"{text!r} is not a reference; {hint}")
+
+
+def engine_names(text: str) -> str:
+    """Names of engines that read a robot's file, with commas."""
+    from ..engines import RECORDS
+    from . import ALWAYS
+
+    known = [name for name, record in RECORDS.items() if record.reads_file]
+    for name in text.split(","):
+        if name not in (*ALWAYS, *known):
+            raise argparse.ArgumentTypeError(block("run", "no_engine", name=name, known=known))
+    return text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +106,7 @@ class TrajectoryOptions(EquationOptions):
 
 @dataclass(frozen=True, kw_only=True)
 class EngineOptions(Options):
-    engines: str | None = option(metavar="LIST", example=f"{ROBOT} --engines drake,mjx")
+    engines: str | None = option(engine_names, "LIST", example=f"{ROBOT} --engines drake,mjx")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -66,7 +66,7 @@ def read_controls(path: str | Path, actuators: Sequence[str], dt: float) -> dict
             line for line in csv.reader(regular(path).splitlines()) if any(cell.strip() for cell in line)
         ]
     except (OSError, ValueError, csv.Error) as error:
-        raise SceneError(f"cannot read the controls of {path}: {' '.join(str(error).split())}") from None
+        raise SceneError(f"cannot read the controls of {path}: {why_unread(error)}") from None
     names, rows = [name.strip() for name in lines[0]] if lines else [], lines[1:]
     for number, name in enumerate(names):
         if name in names[:number]:
@@ -113,6 +113,11 @@ def check_controls(
         raise SceneError(f"{where}: time ends at {times[-1]:g} s, which are {steps}")
 
 
+def why_unread(error: Exception) -> str:
+    """An error in one line, of the system without its number and the path."""
+    return " ".join(str(getattr(error, "strerror", None) or error).split())
+
+
 def regular(path: str | Path) -> str:
     """The text of a regular file; OSError for another: a pipe may be waited for without end."""
     if Path(path).exists() and not Path(path).is_file():
@@ -125,7 +130,7 @@ def entries_of(path: str | Path) -> list[dict[str, Any]]:
     try:
         content = tomllib.loads(regular(path))
     except (OSError, ValueError, RecursionError) as error:  # TOML's and Unicode's errors are ValueErrors
-        why = "it is nested too deep" if isinstance(error, RecursionError) else " ".join(str(error).split())
+        why = "it is nested too deep" if isinstance(error, RecursionError) else why_unread(error)
         raise SceneError(f"{path} is not a TOML file that can be read: {why}") from None
     if others := content.keys() - {"scene"}:
         raise SceneError(f"{path}: {min(others)} is unknown; expected tables [[scene]]")

@@ -9,12 +9,12 @@ from typing import Any, Self, TypeVar
 
 from ..core.cause import Cause
 from ..core.check import ENDS, About, Result
-from ..core.errors import Refused, described
+from ..core.errors import described
 from ..core.finding import Finding
 from ..core.text import block, say
 from ..engines import RECORDS
 from ..engines.own import Problem
-from ..experiments import ALWAYS, EXPERIMENTS, TIMED, Experiment, functions, module
+from ..experiments import EXPERIMENTS, TIMED, Experiment, functions, module
 from ..experiments.options import Options, asked_alone
 from ..experiments.setup import Setup, engines
 from ..process import interrupt
@@ -36,13 +36,10 @@ IN_EQUATIONS += ["flag gravity"]
 
 
 def setup_of(compared: Compared, options: Options, **more: Any) -> Setup:
-    """What the experiments need. more: further fields of Setup. Refused: --engines has a name that is none."""
+    """What the experiments need. more: further fields of Setup."""
     make, of_run = Setup.quick if options.quick else Setup, engines(compared.mujoco, compared.reference.own)
     known, chosen = [name for name, record in RECORDS.items() if record.reads_file], options.get("engines")
     names = chosen.split(",") if chosen else known
-    for name in names:
-        if name not in (*ALWAYS, *known):
-            raise Refused(block("run", "no_engine", name=name, known=known))
     of_run = {name: engine for name, engine in of_run.items() if name in names or name not in known}
     return make(compared.robot, of_run, reading=compared.reading, options=options, **more)
 

@@ -4,15 +4,14 @@ from __future__ import annotations  # so that help() shows the short names of ty
 
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..core.finding import Finding
 from ..core.text import screen
 from ..engines.mujoco.names import INTEGRATORS, integrator_by_name
-from ..engines.mujoco.reading import read
+from ..engines.mujoco.reading import origin_of, read
 from ..robots.scene import is_number
 from ..robots.scene_file import check_controls, read_controls
 from .answer import Question, StepLimitRow, answer
@@ -107,9 +106,7 @@ def step_limits(
     ...     model.actuator_biasprm[:, 2] = -kv
     ...     print(kv, compare.step_limits(model, integrators=["Euler"])["Euler"].stable_up_to_s)
     """
-    if isinstance(mjcf, str | PathLike) and not str(mjcf).lstrip().startswith("<"):
-        mjcf = Path(mjcf)
-    reading = read(cast(Any, mjcf))  # ModelError for what is no model
+    reading = read(origin_of(mjcf))  # ModelError for what is no model
     if isinstance(integrators, str):
         raise ValueError(f"expected a sequence of names; not {integrators!r}")
     numbers = {"push": push, "error": error, "control_period": control_period}

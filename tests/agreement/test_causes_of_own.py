@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
@@ -46,6 +47,15 @@ def test_the_probable_cause_of(brought, cause):
 def test_no_other_error_is_told_where_accelerations_follow_from_a_wrong_bias():
     follows = RIGHT | {"bias": wrong_bias, "acceleration": lambda q, v, t: acceleration(q, v, t, wrong_bias)}
     assert message_of(**follows).count("acceleration") == 1 and SIGN in message_of(**follows)
+
+
+@pytest.mark.parametrize(
+    "ask", [partial(compare.assert_agrees, mass_matrix=mass_matrix), compare.step_limits, compare.tree]
+)
+def test_a_text_that_is_no_model_is_said_to_be_none_and_a_path_to_be_missing(ask):
+    for text, said in (("hello world", "neither the path of a file nor MJCF"), ("none.xml", "No such file")):
+        with pytest.raises(ValueError, match=said):
+            ask(text)
 
 
 def test_the_cause_is_sought_where_there_are_values():

@@ -1,7 +1,9 @@
 """A file read as a Tree, as MuJoCo compiled it; what the Tree does not have is listed and switched off."""
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,15 @@ class Reading(RobotFile):
     def warnings(self) -> tuple[str, ...]:
         """Of MuJoCo's compiler, one line each."""
         return self.source.warnings
+
+
+def origin_of(mjcf: Any) -> Any:
+    """What a user gives as a model: a path as a Path, MJCF text and models as they are. ModelError for another text."""
+    if not isinstance(mjcf, str | PathLike) or str(mjcf).lstrip().startswith("<"):
+        return mjcf
+    if isinstance(mjcf, str) and not Path(mjcf).suffix and not os.path.exists(mjcf):
+        raise ModelError(f"{mjcf[:60]!r} is neither the path of a file nor MJCF text")
+    return Path(mjcf)
 
 
 def read(origin: Source | Path | str | mujoco.MjModel) -> Reading:

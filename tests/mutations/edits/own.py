@@ -96,7 +96,7 @@ EDITS = (
     ("agreement", "rows", "cause if ratio > 1.0 else ''", "cause", "an entry that agrees has a cause"),
     ("agreement.comparison", "Comparison.take_states", "self.joints.forces(_1)", "_1", "torques keep their joints"),
     ("agreement.comparison", "Comparison.take_random", "equations.try_at(*_1)", "None", "functions are not tried"),
-    ("agreement.comparison", "origin_of", "not str(mjcf).lstrip().startswith('<')", "True", "a text is a path"),
+    ("mujoco.reading", "origin_of", "str(mjcf).lstrip().startswith('<')", "False", "a text is a path"),
     ("agreement.why", "Affine.values", "(np.linalg.cond(slopes) > _1).any()", "False", "a joint never moves, and has a mass"),
     ("agreement.why", "of_noise", "equations is not None and _1", "False", "a function of a user has noise"),
     ("agreement.why", "of_coriolis", "'C qd' in failing and bool(_1)", "bool(_1)", "a matrix that is symmetric is transposed"),
