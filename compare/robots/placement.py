@@ -3,7 +3,7 @@
 Joints are the same by name, else by their order among those of their kind. The anchor of a hinge may lie
 anywhere on its axis, that of a slide anywhere: the stated ones are put at the foot of the perpendicular from
 the file's. Frames may be parallel at any position of the joints, and the robot with its gravity may be moved
-and turned.
+and turned. What is moved counts as a number that differs: the placement has the fewest of both.
 """
 
 from collections.abc import Iterator, Sequence
@@ -127,16 +127,25 @@ def placed(stated: tmt.Tree, tree: tmt.Tree) -> Placement:
     }
     free = np.array([onto[kind](axis) for kind, axis in zip(there.kind, axes)])
     tolerance = SAME * max(1.0, np.abs(anchors).max(), np.abs(others).max())
-    shift = shifted(anchors, others, free, tolerance)
-    to_foot = np.einsum("nij,nj->ni", free, others - anchors - shift)
-    is_along = np.abs(to_foot).max(axis=1) > tolerance
+    # by how much centres of mass are elsewhere, from their anchors
+    beside = centres_of(tree, joints) - centres_of(there, range(len(joints))) @ turn.T
+    moves = []
+    for shift in (np.zeros(3), *(others - anchors)[:MOST_AXES]):
+        to_foot = np.einsum("nij,nj->ni", free, others - anchors - shift)
+        is_along = np.abs(to_foot).max(axis=1) > tolerance
+        for along in (np.zeros_like(anchors), to_foot * is_along[:, None]):
+            apart, moved = others - anchors - shift - along, int(shift.any()) + int(along.any(axis=1).sum())
+            differ = differing(there.parent, apart, beside + along, tolerance)
+            moves.append((differ + moved, differ, shift, along))
+    _, _, shift, along = min(moves, key=lambda move: move[:2])
+    is_along = along.any(axis=1)
     if is_along.any() or shift.any() or (turn != np.eye(3)).any():
         turns, gravity = np.array([turn] * len(centres)), tuple((turn @ there.gravity).tolist())
-        feet, axes = anchors + shift + to_foot * is_along[:, None], np.array(there.axis) @ turn.T
+        feet, axes = anchors + shift + along, np.array(there.axis) @ turn.T
         there = with_frames(there, feet, axes, centres + shift, turns, gravity=gravity)
-    along = tuple(name for name, is_it in zip(there.joint_names, is_along) if is_it)
     is_with_gravity = bool(same_vectors(np.array([there.gravity]), np.array([tree.gravity]))[0])
-    return Placement(there, turn, shift, along, drawn, is_with_gravity)
+    names = tuple(name for name, is_it in zip(there.joint_names, is_along) if is_it)
+    return Placement(there, turn, shift, names, drawn, is_with_gravity)
 
 
 def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray]:
@@ -150,10 +159,15 @@ def places_of(tree: tmt.Tree) -> tuple[np.ndarray, np.ndarray]:
 def vectors_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
     """Vectors that turn with a robot, (k, 3): axes, distances of anchors, centres of mass; gravity last."""
     anchors, axes = (values[list(joints)] for values in places_of(tree))
-    centres = np.zeros_like(anchors)
+    return np.vstack([axes, np.diff(anchors, axis=0), centres_of(tree, joints), tree.gravity])
+
+
+def centres_of(tree: tmt.Tree, joints: Sequence[int]) -> np.ndarray:
+    """The centre of mass of what each joint moves alone, from its anchor, m, (n, 3); 0 without mass."""
+    moments = np.zeros((len(joints), 4))
     for mass, joint, com in zip(tree.mass, tree.body_joint, tree.com):
-        centres[list(joints).index(joint)] += np.multiply(mass, com)
-    return np.vstack([axes, np.diff(anchors, axis=0), centres, tree.gravity])
+        moments[list(joints).index(joint)] += np.multiply(mass, (*com, 1.0))
+    return moments[:, :3] / np.where(moments[:, 3:] > 0.0, moments[:, 3:], 1.0)
 
 
 def drawn_at(stated: tmt.Tree, reference: Sequence[float]) -> tmt.Tree:
@@ -208,12 +222,10 @@ def frame_of(first: np.ndarray, second: np.ndarray) -> np.ndarray | None:
     return np.column_stack([x, np.cross(z, x), z])
 
 
-def shifted(anchors: np.ndarray, others: np.ndarray, free: np.ndarray, tolerance: float) -> np.ndarray:
-    """The shift, (3,) m, with which most anchors, (n, 3), are the others apart from free directions, or 0."""
-
-    def count(shift: np.ndarray) -> int:
-        apart = others - anchors - shift
-        left = apart - np.einsum("nij,nj->ni", free, apart)
-        return int((np.abs(left).max(axis=1) <= tolerance).sum())
-
-    return max([np.zeros(3), *(others - anchors)[:MOST_AXES]], key=count)  # the first of the best
+def differing(parents: Sequence[int], anchors: np.ndarray, centres: np.ndarray, tolerance: float) -> int:
+    """How many numbers differ by differences of anchors and of centres of mass, (n, 3) m: of anchors or offsets."""
+    offsets = anchors - np.vstack([anchors, np.zeros(3)])[list(parents)]  # -1: the last
+    of_anchors, of_offsets, of_centres = (
+        int((np.abs(vectors).max(axis=1) > tolerance).sum()) for vectors in (anchors, offsets, centres)
+    )
+    return min(of_anchors, of_offsets) + of_centres

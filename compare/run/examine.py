@@ -31,8 +31,8 @@ START, END = "start", "figures"  # tasks of the clock: before the first experime
 SHOWN = 3  # causes on the terminal
 VALID = "returns valid values"  # of a function of the user's own
 # the numbers on which Mbar and h depend, by their names in `parameters`
-IN_EQUATIONS = ["order", "parent", "ref", "axis", "anchor", "com", "mass", "inertia", "gravity", "armature"]
-IN_EQUATIONS += ["flag gravity"]
+IN_EQUATIONS = ["order", "parent", "ref", "axis", "anchor", "offset", "com", "mass", "inertia", "gravity"]
+IN_EQUATIONS += ["armature", "flag gravity"]
 
 
 def setup_of(compared: Compared, options: Options, **more: Any) -> Setup:

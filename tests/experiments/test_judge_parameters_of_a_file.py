@@ -96,15 +96,15 @@ def test_a_number_that_differs_for_no_reason_is_a_cause_as_is_one_that_is_none()
 
 
 @pytest.mark.parametrize("moved, passes", [(0.0, True), (1e-13, False), (-1e-13, False)])
-def test_an_anchor_stated_as_0_may_be_off_by_rounding_of_the_lengths_that_lead_there(moved, passes):
+def test_an_offset_stated_as_0_may_be_off_by_rounding_of_the_lengths_that_lead_there(moved, passes):
     """1e-13 m is about ten times the tolerance."""
     place, R = np.array([0.1, -0.2, 0.3]), np.zeros(9)
     mujoco.mju_quat2Mat(R, np.array([0.5, 0.1, -0.7, 0.5]))
     back = " ".join(map(repr, (moved - place @ R.reshape(3, 3)).tolist()))
     text = XML.replace('pos="0 0 0"', 'pos="0.1 -0.2 0.3" quat="0.5 0.1 -0.7 0.5"', 1)
     result = parameters.rows(setup_of(text.replace('type="hinge"', f'pos="{back}"', 2)))
-    anchors = {check.scene: check for check in result.checks if check.quantity == "anchor"}
-    assert anchors["alpha"].passed == anchors["beta"].passed == passes and anchors["alpha"].value > 0.0
+    offset = next(check for check in result.checks if (check.scene, check.quantity) == ("alpha", "offset"))
+    assert offset.passed == passes and offset.value > 0.0
 
 
 def beside_solution(tmp_path, text, solution=CART):
@@ -128,6 +128,48 @@ def test_a_number_that_is_another_one_than_in_the_solution_is_the_cause(tmp_path
     found = [(cause.place, cause.stated, pytest.approx(cause.explains)) for cause in result.causes]
     assert found == causes
     assert len(failing(result)) == len(causes) and len(result.checks) > 20
+
+
+CHAIN = {  # the joint of each body, and its place in the one before
+    'a" axis="0 0 1': (0.0, 0.0, 0.2), 'b" axis="0 1 0': (0.05, 0.0, 0.15), 'c" axis="0 1 0': (0.0, 0.0, 0.45),
+    'd" axis="1 0 0': (0.2, 0.0, 0.05), 'e" type="slide" axis="0 0 1': (0.22, 0.0, 0.0), 'f" axis="0 0.6 0.8': (0.08, 0.03, 0.0),
+}  # fmt: skip
+
+
+def chain(places):
+    """Bodies in a row, each with its centre of mass off its joint."""
+    inertial = '<inertial pos="0.03 0.02 0.05" mass="2" diaginertia="0.1 0.1 0.12"/>'
+    bodies = (
+        f'<body name="link {joint[0]}" pos="{" ".join(map(str, place))}"><joint name="{joint}"/>{inertial}'
+        for joint, place in zip(CHAIN, places)
+    )
+    return f"<mujoco><worldbody>{''.join(bodies)}{'</body>' * len(CHAIN)}</worldbody></mujoco>"
+
+
+@pytest.mark.parametrize("off", [0.01, 300.0])
+@pytest.mark.parametrize("axis", range(3))
+def test_the_place_of_one_joint_in_the_body_before_is_one_cause(tmp_path, axis, off):
+    """Whatever it carries is moved with it; the first joint is that of a robot elsewhere."""
+    right = np.array([*CHAIN.values()])
+    for k, joint in enumerate(CHAIN):
+        wrong = right.copy()
+        wrong[k, axis] += off
+        result = beside_solution(tmp_path, chain(wrong), chain(right))
+        found = [
+            (cause.place, *map(pytest.approx, (cause.stated, cause.explains))) for cause in result.causes
+        ]
+        assert found == [(f"offset {'xyz'[axis]} of {joint[0]}", right[k, axis], wrong[k, axis])] * (k > 0)
+        assert len(failing(result)) == len(found)
+
+
+def test_what_is_off_in_many_places_is_not_moved_to_where_some_are_near(tmp_path):
+    """All in mm: the first joint is that of a robot elsewhere. An anchor beside the axis, of a body in its place."""
+    right = np.array([*CHAIN.values()])
+    in_mm = chain(1e3 * right).replace('"0.03 0.02 0.05"', '"30 20 50"')
+    off = {check.scene for check in beside_solution(tmp_path, in_mm, chain(right)).checks if check.failed}
+    assert off == {*"bcdef", *(f"link {joint[0]}" for joint in CHAIN)}
+    beside = chain(right).replace('axis="0 0.6 0.8"', 'axis="0 0.6 0.8" pos="0.01 0.06 0.08"')
+    assert sorted(failing(beside_solution(tmp_path, beside, chain(right)))) == ["com", "offset"]
 
 
 @pytest.mark.parametrize("off, names", [(4e-15, []), (4e-14, ["com"])])

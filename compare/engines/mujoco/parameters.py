@@ -41,9 +41,7 @@ def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
     dynamics.forward(m.qpos0[dynamics.qpos])
     joints, dofs, turns = dynamics.joints.tolist(), dynamics.dofs, dynamics.turns(d.ximat)
     in_force = on(m, "CONTACT") and on(m, "CONSTRAINT")
-    before = {}
-    for j, body in zip(joints, m.jnt_bodyid[joints]):
-        before[j] = j - 1 if j > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
+    before = {j: joint_before(m, j) for j in joints}
     is_order = all(before[j] in (-1, *joints[:i]) for i, j in enumerate(joints))
     places = joints if is_order else sorted(joints)  # each after its parent
     origins = dict(zip(joints, d.xanchor[joints])) | {-1: np.zeros(3)}
@@ -60,6 +58,7 @@ def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
         "ref": m.qpos0[dynamics.qpos],
         "axis": d.xaxis[joints],
         "anchor": d.xanchor[joints],
+        "offset": [origins[j] - origins[before[j]] for j in joints],
         "com": d.xipos[bodies] - [origins[last_hinge(m, body)] for body in bodies],
         "inertia": np.array([tensor(*of_body) for of_body in zip(turns, m.body_inertia[bodies])]),
         "other mass": np.delete(m.body_mass, bodies).sum(),
@@ -67,7 +66,7 @@ def parameters(dynamics: MujocoDynamics) -> dict[str, Any]:
 
 
 def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
-    """Sums of the lengths that place each anchor, and each centre of mass relative to its anchor, m."""
+    """Sums of the lengths that place each anchor, it and each centre of mass relative to the anchor before, m."""
     m, to_body = dynamics.model, np.zeros(dynamics.model.nbody)
     for body in range(1, m.nbody):
         to_body[body] = to_body[m.body_parentid[body]] + np.linalg.norm(m.body_pos[body])
@@ -75,7 +74,14 @@ def lengths(dynamics: MujocoDynamics) -> dict[str, np.ndarray]:
     to_joint = np.append(to_joint, 0.0)  # the last: of no joint, -1
     before = to_joint[[last_hinge(m, body) for body in dynamics.bodies]]
     of_bodies = (to_body + np.linalg.norm(m.body_ipos, axis=1))[dynamics.bodies]
-    return {"anchor": to_joint[dynamics.joints], "com": before + of_bodies}
+    anchors, carrying = to_joint[dynamics.joints], [joint_before(m, j) for j in dynamics.joints.tolist()]
+    return {"anchor": anchors, "offset": anchors + to_joint[carrying], "com": before + of_bodies}
+
+
+def joint_before(m: mujoco.MjModel, joint: int) -> int:
+    """The joint that carries a joint, by its number, -1: none."""
+    body = m.jnt_bodyid[joint]
+    return joint - 1 if joint > m.body_jntadr[body] else last_hinge(m, m.body_parentid[body])
 
 
 def last_hinge(m: mujoco.MjModel, body: int) -> int:

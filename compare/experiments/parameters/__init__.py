@@ -128,7 +128,8 @@ def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
         added = {name: values + reach for name, values in added.items()}
     else:
         stated, compiled = stated_of_hinges(tree), parameters(dynamics)
-    for quantity in (name for name in UNITS if name in compiled):
+    left_out = {"anchor", "offset"} - {place_of_joints(stated, compiled, added)}
+    for quantity in (name for name in UNITS if name in compiled and name not in left_out):
         values = np.asarray(compiled[quantity], dtype=float)
         right = np.broadcast_to(np.asarray(stated.get(quantity, 0.0), dtype=float), values.shape)
         names = owners(tree, quantity)
@@ -136,6 +137,15 @@ def beside_stated(setup: Setup, dynamics: MujocoDynamics) -> Iterator[Stated]:
         sizes = added.get(quantity, np.abs(right).max(axis=1))
         for owner, number, value, size in zip(names, right, values, sizes):
             yield Stated(owner, quantity, number, value, tolerance=FACTOR * EPS * size)
+
+
+def place_of_joints(stated: dict[str, Any], compiled: dict[str, Any], added: dict[str, np.ndarray]) -> str:
+    """ "anchor", in the world; where some differ, "offset", from the anchor before, if no more of these do."""
+    of_offsets, of_anchors = (
+        np.sum(np.abs(np.subtract(stated[name], compiled[name])).max(axis=1) > FACTOR * EPS * added[name])
+        for name in ("offset", "anchor")
+    )
+    return "offset" if 0 < of_offsets <= of_anchors else "anchor"
 
 
 def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> dict[str, Any]:
@@ -152,7 +162,8 @@ def numbers_of(tree: tmt.Tree, joints: Sequence[int], bodies: Sequence[int]) -> 
     numbers["rest"] = numbers["rest"] * np.repeat(numbers["stiffness"] > 0.0, counts)
     number_of_joint = {-1: -1} | {j: i for i, j in enumerate(joints)}
     parents = np.array([number_of_joint[tree.parent[j]] for j in joints])
-    numbers |= {"parent": parents, "anchor": anchors[joints], "gravity": np.array(tree.gravity)}
+    numbers |= {"anchor": anchors[joints], "offset": np.array(tree.offset)[joints]}
+    numbers |= {"parent": parents, "gravity": np.array(tree.gravity)}
     return numbers | {"ref": numbers.pop("reference")}
 
 

@@ -15,8 +15,8 @@ SAME = 1e-9  # relative: a factor, or a change, that is the same at several plac
 # of the largest of a vector: mj_saveLastXML writes six digits, which moves a number by half a unit of its
 # sixth digit, 5e-6 at most, and one that is turned by a quaternion twice as much
 SIX_DIGITS = 1e-5
-ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("anchor", "com"))  # quantities with a common factor
-OF_JOINTS = "anchor", "axis", "ref"
+ALIKE = (("mass", "inertia"), ("mass",), ("inertia",), ("offset", "com"))  # quantities with a common factor
+OF_JOINTS = "anchor", "offset", "axis", "ref"
 
 
 def causes_of(numbers: Sequence[Compared], sides: Sequence[str]) -> list[Cause]:

@@ -27,7 +27,7 @@ OPTIONS = (*STATED_FLAGS, "order", "parent", "ref", "density", "viscosity", "con
 WHOLE_NUMBERS = (*STATED_FLAGS, "order", "parent", "limited", "contact pairs")
 OF_BODIES = ("mass", "com", "inertia", "gravcomp")
 UNITS = dict.fromkeys((*STATED_FLAGS, "order", "parent", "axis", "limited", "gravcomp", *ABSENT), "") | {
-    "ref": "rad", "anchor": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "rest": "rad",
+    "ref": "rad", "anchor": "m", "offset": "m", "pos": "m", "damping": "N m s/rad", "armature": "kg m2", "rest": "rad",
     "frictionloss": "N m", "stiffness": "N m/rad", "mass": "kg", "com": "m", "inertia": "kg m2",
     "gravity": "m/s2", "density": "kg/m3", "viscosity": "Pa s", "other mass": "kg",
     "tendon armature": "kg m2", "actuator armature": "kg m2",

@@ -1,8 +1,8 @@
 """Edits of the comparison state by state: the model read back, printed numbers, Mbar, bias, accelerations."""
 
 READ = (
-    "flag gravity", "flag damper", "flag eulerdamp", "order", "ref", "axis", "anchor", "damping", "armature", "frictionloss",
-    "stiffness", "limited", "mass", "com", "inertia", "gravcomp", "gravity", "density", "viscosity", "other mass",
+    "flag gravity", "flag damper", "flag eulerdamp", "order", "ref", "axis", "anchor", "offset", "damping", "armature",
+    "frictionloss", "stiffness", "limited", "mass", "com", "inertia", "gravcomp", "gravity", "density", "viscosity", "other mass",
     "tendon armature",
 )  # fmt: skip
 FOUND = "np.asarray(compiled[quantity], dtype=float)"
@@ -15,6 +15,8 @@ EDITS = (
     ),
     ("robots.placement", "placed", "max(tried, *_1)", "max(tried[::-1], *_1)", "a robot is turned though no more is the same"),
     ("robots.placement", "placed", "to_foot * _1", "others - anchors - shift", "an anchor may be anywhere"),
+    ("robots.placement", "differing", "min(of_anchors, of_offsets)", "of_anchors", "what a joint carries is moved with it"),
+    ("robots.placement", "placed", "differ + moved", "differ", "moving a robot is no difference"),
     ("robots.placement", "placed", "np.zeros((3, 3))", "np.eye(3)", "the anchor of a ball may be anywhere"),
     ("mujoco.locked", "join", "masses.sum()", "masses.max()", "the mass of one body is that of several", 1),
     ("mujoco.locked", "compiled", "not model.body_subtreemass[body]", "False", "a link may move without mass"),
