@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # they take long to load
 # modules that take long to load
 DRAWING, COMPUTING = "compare.report.style", "tmt.compiled.machine"
 INTERRUPTED = "interrupted"  # folder in that of an earlier report
+MOST_BETWEEN = 5  # lines of a run of several between its first cause and its verdict without the cause
 MOST_FAILING = 3  # checks on the first screen of one experiment
 
 
@@ -94,7 +95,7 @@ def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
     others = block("verdict", "others", failing=failing).splitlines()
     mended = [block("run", "mended", states=states)] if states else []
     if not is_alone:
-        return [*verdict, *mended, *others]
+        return [*verdict, *said_again(report), *mended, *others]
     causes = [line for cause in report.causes[:SHOWN] for line in lines_of(cause)]
     if report.answers_first:
         differs = [*verdict[-1:], *causes] if failing["differing"] or failing["broke"] else []
@@ -104,6 +105,19 @@ def first_screen(report: Report, states: int, is_alone: bool) -> list[str]:
     has_number = section.result.headline and (section.record.compares or not causes)
     answer = report.answer if has_number or report.top else []
     return [*verdict, *causes, *checks, *mended, *answer, *others]
+
+
+def said_again(report: Report) -> list[str]:
+    """The first cause, where it was said far above the verdict."""
+    from .examine import SHOWN, lines_of
+
+    lines = [line for cause in report.causes[:SHOWN] for line in lines_of(cause)]
+    differ = [bool(failures([section])["differing"]) for section in report.sections]
+    if not lines or True not in differ:
+        return []
+    between = len(lines) - 1 + len(differ) - 1 - differ.index(True)
+    more = f" (and {len(lines) - 1} more above)" if len(lines) > 1 else ""
+    return [f"{lines[0]}{more}"] if between > MOST_BETWEEN else []
 
 
 def compute(

@@ -22,8 +22,9 @@ from compare.experiments.trajectory.runs import TrajectoryResult
 from compare.judge.agree import AgreementRow
 from compare.report.questions import answers
 from compare.report.style import BLUE, ORANGE
-from compare.report.verdict import failures, headline, passed, standing, verdict
+from compare.report.verdict import Report, failures, headline, passed, standing, verdict
 from compare.robots.arm import ARM
+from compare.run.command import first_screen
 from compare.run.examine import lines_of, section_with
 
 CAUSE = {"rank": 2, "experiment": "parameters", "text": "mass of forearm: stated 1"}
@@ -195,6 +196,14 @@ def test_first_screen_of_several_experiments_has_the_answers_alone():
     )
     assert [text.kind for text in several.top] == ["answer", "remedies"] and alone.top == result.top
     assert [text.kind for text in several.notes] == ["limits_at", "rest", "examined"]
+
+
+@pytest.mark.parametrize("below, is_said", [(5, False), (6, True)])
+def test_a_cause_far_above_the_verdict_is_said_again_beside_it(below, is_said):
+    cause = Cause(rank=1, place="mass", stated=1.0, explains=2.0, text="mass: 2 instead of 1")
+    sections = [section("mass", BAD), *[section("gravity", GOOD)] * below]
+    report = Report(sections, ARM, {}, "They differ.", [cause])
+    assert first_screen(report, 0, False) == ["They differ.", *["  CAUSE mass: 2 instead of 1"] * is_said]
 
 
 def timed(engine, method, seconds, error, **more):
