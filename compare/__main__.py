@@ -18,6 +18,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BaseException as error:
         if isinstance(error, SystemExit) or interrupt.is_interrupt(error):
             raise
+        if interrupt.Now.is_interrupted:  # of which a library that is imported, or draws, makes another error
+            raise KeyboardInterrupt from error
         interrupt.settle()
         streams.say_error(str(error) if isinstance(error, Refused) else f"cannot go on: {described(error)}")
         return 2

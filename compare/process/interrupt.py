@@ -99,7 +99,7 @@ def ended_by_signals(run: Callable[[], int], is_own: bool = False) -> int:
     if is_interrupted or "interrupted" in told:
         how = f"interrupted{told.get('interrupted', '')}"
         with suppress(OSError):
-            os.write(2, b"\r\x1b[2K" * os.isatty(2))  # over ^C
+            os.write(2, b"\r\x1b[2K\x1b[?25h" * os.isatty(2))  # over ^C; the cursor is back
     streams.say_error(f"{how}; {told['outcome']}")
     return 2
 

@@ -180,3 +180,16 @@ def test_called_from_python_the_command_line_leaves_signals_alone():
     before = signal.getsignal(signal.SIGINT)
     assert main(["mass", "--out", os.devnull]) == 2
     assert signal.getsignal(signal.SIGINT) is before and signal.set_wakeup_fd(-1) == -1
+
+
+def test_an_error_that_an_interrupt_becomes_in_a_library_is_the_interrupt(monkeypatch):
+    """pybind11 makes an ImportError of it, rich's stack of displays an IndexError."""
+
+    def imported(arguments):
+        raise ImportError("initialization failed")
+
+    monkeypatch.setattr("compare.__main__.status_of", imported)
+    assert main([]) == 2
+    monkeypatch.setattr("compare.process.interrupt.Now.is_interrupted", True)
+    with pytest.raises(KeyboardInterrupt):
+        main([])
