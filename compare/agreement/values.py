@@ -1,4 +1,4 @@
-"""What is compared by assert_agrees: the quantities, a state, and the values of one quantity at all states."""
+"""What assert_agrees compares: the quantities, a state, and the values of one quantity at all states."""
 
 from typing import NamedTuple
 

@@ -175,7 +175,7 @@ class Search:
         return fits + (self.fitted(sets, np.array(starts)[:, None]) if sets else [])
 
     def at_zero(self, fit: Fitted) -> Fitted:
-        """A fit with numbers at zero where that explains as much: a double root is found to half the digits."""
+        """A fit with zeros where these explain as much: a double root is found to half the digits."""
         changes = list(fit.changes)
         for k, (one, change) in enumerate(zip(fit.hypotheses, changes)):
             stated = float(one.cause.stated)

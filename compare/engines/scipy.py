@@ -80,7 +80,7 @@ class ScipyDynamics(TmtQuantities, OneByOne):
 
 
 def of_length_1(coordinates: Coordinates, q: Array) -> Array:
-    """Positions (times, nq) with each quaternion divided by its length, which a coarse tolerance lets drift."""
+    """Positions (times, nq) with quaternions divided by their length, which a coarse tolerance lets drift."""
     q = q.copy()
     for joint in coordinates.places.balls:
         q[:, joint.q] /= np.linalg.norm(q[:, joint.q], axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""A run of a case by a method of an engine, at equal times: `speed` and `trajectory` have theirs from here."""
+"""A run of a case by a method of an engine, at equal times: for `speed` and `trajectory`."""
 
 import time
 from dataclasses import dataclass

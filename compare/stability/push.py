@@ -222,7 +222,7 @@ class Pushed(Runs):
         return 3 * sum(map(bool, whys)) >= len(whys)
 
     def limit(self, push: float, integrator: str, surely: bool = True, first: float | None = None) -> Limit:
-        """The longest step after a push, sought upwards or downwards from the first, by default the one in use.
+        """The longest step after a push, sought up or down from the first, by default the one in use.
 
         surely: it, and one that is shorter by BELOW, hold after further patterns too, and so does the one in
         use; a factor ABOVE above the one that fails, a third of all patterns fail. Between both it depends on

@@ -261,7 +261,7 @@ class Stepper:
 
 
 def distance(m: mujoco.MjModel, q0: Array, q1: Array) -> Array:
-    """The tangent vector from positions to others, (..., nq): (..., nv) rad or m, of a ball in its own axes."""
+    """The tangent vector from positions to others, (..., nq): (..., nv) rad, m; of a ball in its own axes."""
     pairs = np.broadcast_arrays(q0, q1)
     rows = [np.ascontiguousarray(q, float).reshape(-1, m.nq) for q in pairs]
     moved = np.zeros((len(rows[0]), m.nv))

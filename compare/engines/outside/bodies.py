@@ -128,7 +128,7 @@ def combined(parts: Sequence[Body]) -> Body:
 
 
 def size_of(stated: Numbers, number: str) -> float:
-    """The size of what is added where an engine reads a number: it may keep inertias about the origin of a link.
+    """The size of what is added where an engine reads a number; it may keep inertias about the origin of a link.
 
     Of places and directions: the lengths of the tree, times the number of joints, as each turn on the way may
     round.

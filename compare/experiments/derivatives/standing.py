@@ -77,7 +77,7 @@ class Standing:
 
 
 def errors_of(values: Sequence[Array], halved: Sequence[Array], nv: int) -> tuple[list[float], Array | None]:
-    """The errors of derivatives by neighbouring eps, and the truth: what agrees over the widest range of them.
+    """The errors of derivatives by neighbouring eps, and the truth: what agrees over their widest range.
 
     values, halved: with each eps and half of it. Richardson's extrapolation takes the term in eps^2 away;
     what is then the same for FEWEST neighbours is true, where they agree best. An error is that from both of

@@ -96,7 +96,7 @@ class Scene:
 
 
 def scene_of(setup: Setup, reading: Reading) -> tuple[Scene, list[Motion]]:
-    """All of --scenes; else --controls, or what the file states, from a posture. ValueError: that cannot be."""
+    """All of --scenes; else --controls, or what the file states, from a posture. Or ValueError."""
     asked = setup.asked(ReductionOptions)
     points = tuple(asked.points.split(",")) if asked.points else ()
     whole = Smaller.whole(reading.source, points)

@@ -46,7 +46,7 @@ def compare_case(case: Case, engines: Mapping[str, Engine], finer: Sequence[int]
 
 
 def stable_part(case: Case, scheme: str, dt: float) -> Case:
-    """The case; in a scene of a file, if the scheme does not bear dt, its beginning, with a step that it bears.
+    """The case; in a scene of a file, if the scheme does not bear dt, its beginning with a step that it bears.
 
     The forces of springs limit every scheme, those of damping RK4, and those of servos Euler, too.
     """
