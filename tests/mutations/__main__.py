@@ -24,7 +24,9 @@ from .edit import DoesNotApply, Edit, Place, applied
 from .edits import EDITS
 
 PROJECT = Path(__file__).resolve().parents[2]
-NOT_COPIED = shutil.ignore_patterns(".*", "__pycache__", "*.egg-info", "build", "latest")
+NOT_COPIED = shutil.ignore_patterns(
+    ".git", ".venv*", "*_cache", "__pycache__", "*.egg-info", "build", "latest"
+)
 BLIND = ("test_mutations.py", "test_structure.py", "test_interrupt.py")  # they see any edit, or none
 SLICES = 0, 4, 16, 1000  # parts of the list of test files: most edits are caught by the first
 PATIENCE, PATIENCE_WITH_FILE = 90.0, 20.0  # s of a part, and for each of its files: then a run has no end

@@ -28,5 +28,4 @@ EDITS = (
     ("mujoco.stepper", "Stepper.__init__", "~SLEEP", "-1", "what sleeps stays asleep"),
     ("mujoco.stepper", "Stepper.taken", "warned + 1", "warned", "a step after which MuJoCo warns is none"),
     ("mujoco.whole", "Whole.__init__", "model.body_treeid >= 0", "model.body_weldid > 0", "a mocap body is a part of the whole"),
-    ("mujoco.whole", "Whole.momentum", "trees - middle", "d.subtree_com[self.trees] - self.com(d)", "levers round as heights"),
 )  # fmt: skip
