@@ -27,12 +27,8 @@ class Once(argparse.Action):
     is_stated = False
 
     def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        _: str | None = None,
-    ) -> None:
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, _: str | None = None
+    ) -> None:  # fmt: skip
         if self.is_stated:
             parser.error(f"{self.option_strings[0]} is stated twice")
         self.is_stated = True
@@ -52,12 +48,8 @@ class Parser(argparse.ArgumentParser):
         """Add an option; its help is the macro of its name, or the one that it names."""
         values: dict[str, Any] = {"action": "store_true"}
         if option.type:
-            values = {
-                "type": option.type,
-                "metavar": option.metavar,
-                "default": option.default,
-                "action": Once,
-            }
+            values = {"type": option.type, "metavar": option.metavar, "default": option.default}
+            values["action"] = Once
         text = block(template, option.text or name_of(word))
         self.add_argument(word, help=" ".join(text.split()), **values)
 

@@ -10,9 +10,9 @@
   the push.
 - The longest step that is found is tried with eight further patterns, in longer runs, and so is one that is shorter
   by 6 %. 8 % above the one that fails, a third of all patterns fail: in between it depends on the push.
-- A step holds if after each pattern the run is as still at its end as fine runs are, grows no more, and ends where
-  they do; what is free may slide and turn on its floor. Where fine runs of two steps or patterns end
-  elsewhere the place is chance, and is not judged.
+- A step holds if after each pattern the run, or one three times as long, is as still at its end as fine runs are,
+  grows no more, and ends where they do; what is free may slide and turn on its floor. Where fine runs of two
+  steps or patterns end elsewhere the place is chance, and is not judged.
 - What coasts (no damping, a keyframe with speeds, recorded controls) is judged joint by joint: nowhere faster than
   three times the fine run, or the push. What moves on by itself is judged by divergence alone: not finite, or
   ten times as fast as fine runs.

@@ -1,6 +1,5 @@
 """Runs of a motion after pushes: by any step and integrator, and by the fine steps that are taken for the truth."""
 
-import os
 import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -9,6 +8,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import mujoco
 import numpy as np
+
+from tmt.compiled.cores import cores
 
 from ..engines.mujoco.changes import changed
 from ..engines.mujoco.names import bit, matrix
@@ -228,5 +229,5 @@ def without_sensors(motion: Motion) -> Motion:
 
 def in_threads(function: Callable[[T], U], items: Iterable[T]) -> list[U]:
     """The values of a function, in threads: MuJoCo steps without Python's lock."""
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
+    with ThreadPoolExecutor(cores()) as threads:
         return [*threads.map(function, items)]

@@ -94,25 +94,25 @@ def test_one_slip_is_one_cause_beneath_the_first_experiment_that_differs(folder,
     assert others and [f"     or {x}" for x in others] == [x for x in lines if x.startswith("     or ")]
 
 
-def test_an_entry_that_is_never_finite_is_named_and_has_no_cause(folder, capsys):
-    """h[hip] is NaN, h[knee] is 0: that your h is 0 would be untrue."""
-    holed = "holed = changed(bias=lambda q, v: np.array([np.nan, 0.0]))"
-    (folder / "holed.py").write_text(f"from mine import *\n\n{holed}\n")
+def said_of(bias, folder, capsys) -> str:
+    """What a run says that differs, of the equations with another bias."""
+    (folder / "holed.py").write_text(f"from mine import *\n\nholed = changed(bias=lambda q, v: {bias})\n")
     with without_workers():
         status, out, _ = answered([*ALL, "holed.py:holed"], capsys)
     words = " ".join(out.split())
     assert status == 1 and "With the cause mended" not in words
+    return words
+
+
+def test_an_entry_that_is_never_finite_is_named_and_has_no_cause(folder, capsys):
+    """h[hip] is NaN, h[knee] is 0: that your h is 0 would be untrue."""
+    words = said_of("np.array([np.nan, 0.0])", folder, capsys)
     assert "bias[0] is not finite" in words and "CAUSE" not in words
     assert "h[hip] is not finite" in Path("reports/latest/report.md").read_text(encoding="utf-8")
 
 
 def test_what_is_finite_at_some_states_has_a_cause_there(folder, capsys):
-    rare = "rare = changed(bias=lambda q, v: 0.0 * v + (np.nan if q[0] > 1.0 else 0.0))"
-    (folder / "rare.py").write_text(f"from mine import *\n\n{rare}\n")
-    with without_workers():
-        status, out, _ = answered([*ALL, "rare.py:rare"], capsys)
-    words = " ".join(out.split())
-    assert status == 1 and "With the cause mended" not in words
+    words = said_of("0.0 * v + (np.nan if q[0] > 1.0 else 0.0)", folder, capsys)
     assert 0 < words.index("bias is not finite") < words.index("CAUSE ")
 
 

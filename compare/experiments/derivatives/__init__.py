@@ -116,12 +116,8 @@ def add_standing(result: Result, place: standing.Standing, function: str) -> Non
     if place.acting:
         result.tables["contact_derivatives"] = rows
     limits = sorted(name for name in place.acting if name.startswith("limit of "))
-    about = {
-        "posture": place.name,
-        "way": function,
-        "contacts": len(place.acting) - len(limits),
-        "limits": limits,
-    }
+    about = {"posture": place.name, "way": function, "contacts": len(place.acting) - len(limits)}
+    about["limits"] = limits
     opened = next((row for row in reversed(rows) if row.changed), None)
     result.top.append(result.finding("standing", about=about, best=best, opened=opened, names=names))
     if place.stands and best:

@@ -22,7 +22,7 @@ FINE_STEPS = (1e-2, 1e-3)  # s, of departures, in addition to that of the claims
 
 def claim_values(robot: Robot) -> dict[str, Any]:
     """The numbers of the definition, for its text."""
-    names = "USUAL WAYS LASTS STILL STILLER AS_FAST FAST GROWS ELSEWHERE BY_CHANCE LONGEST WITHIN"
+    names = "USUAL WAYS LASTS STILL STILLER AS_FAST FAST GROWS LONGER ELSEWHERE BY_CHANCE LONGEST WITHIN"
     numbers = vars(of_runs) | vars(push)
     return {name.lower(): numbers[name] for name in names.split()}
 
